@@ -13,6 +13,7 @@ from clearway.experiments import across_rooms
 from clearway.experiments.across_rooms import InRoom
 from clearway.experiments.correction import corrected
 from clearway.experiments.groups import Scores
+from clearway.experiments.in_short import in_short
 from clearway.experiments.job import episodes_of
 from clearway.experiments.reproduce import planned
 from clearway.experiments.section import Claim
@@ -47,6 +48,8 @@ def test_every_room_has_agents_of_its_own(setting: Setting) -> None:
     (figure,) = section.figures
     assert figure.series[0].y == (1, 1) and len(set(figure.series[0].x)) == 2
     assert {claim.verdict for claim in section.claims} == {"undecided"}
+    (line,) = in_short([section])
+    assert "(3 asked): fewer than 6 rooms, or rooms that lack runs, decide nothing (one" in line and "4" not in line
     assert all("2 of 2 rooms are complete" in claim.evidence and claim.p is None for claim in section.claims)
     assert [{job.run.seed for job in jobs if job.run.scenes == (file,)} for file in setting.files] == [{0, 1}, {2, 3}]
 

@@ -37,6 +37,15 @@ def test_where_runs_are_too_few_one_line_says_so() -> None:
     assert is_judged(counted) and in_short(counted)[0].endswith("Undecided (1): all are good.")
 
 
+def test_a_section_with_a_rule_of_its_own_says_why_nothing_is_judged() -> None:
+    asked = (claim("paper: all rooms", "undecided", p=None),)
+    own = Section("s", "", "", claims=asked, unjudged="six rooms are needed")
+    alone, both = in_short([own]), in_short([own, own, *section(*asked), Section("t", "", "", unjudged="no claims")])
+    assert alone == ("No claim is judged (1 asked): six rooms are needed. The tables hold what was measured.",)
+    (line,) = both
+    assert "(3 asked): six rooms are needed; fewer than 4 complete runs of a kind decide nothing. The" in line
+
+
 def test_it_is_never_longer_than_ten_lines() -> None:
     found = in_short(section(*(claim(f"learner {number}: better", "holds") for number in range(30))))
     assert len(found) == MOST_LINES and found[-1] == "And 21 more lines, below."

@@ -54,6 +54,10 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         ("Experiment(lambda s: [], lambda s: Section('fig5', '', ''))", "its section is called 'fig5', expected 'odd'"),
         ("Experiment(lambda s: [], lambda s: Section('odd', 7, ''))", "its section has 7 where a text is expected"),
         (
+            "Experiment(lambda s: [], drawn(unjudged=7))",
+            "its section has 7 where a text is expected",
+        ),
+        (
             "Experiment(lambda s: [], lambda s: Section('odd', '', '', 7))",
             "its section's tables are 7, expected a tuple of Rep",
         ),

@@ -92,6 +92,7 @@ def section(setting: Setting) -> Section:
         ),
         figures=tuple(_figures(walks, found)),
         claims=further(claim for learner, own in found.items() for claim in _claims(setting, learner, own)),
+        unjudged=f"fewer than {LEAST_ROOMS} rooms, or rooms that lack runs, decide nothing (one seed a room is enough)",
     )
 
 

@@ -9,6 +9,7 @@ from clearway.experiments.section import Claim, Section, Verdict
 from clearway.experiments.verdicts import LEAST_RUNS
 
 MOST_LINES = 10
+TOO_FEW = f"fewer than {LEAST_RUNS} complete runs of a kind decide nothing"
 NAMED = 3  # claims of one verdict that a line names
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
@@ -24,10 +25,8 @@ def in_short(sections: Sequence[Section]) -> tuple[str, ...]:
     if not claims:
         return ()
     if not is_judged(sections):
-        return (
-            f"No claim is judged ({len(claims)} asked): fewer than {LEAST_RUNS} complete runs of a kind decide "
-            "nothing. The tables hold what was measured.",
-        )
+        why = dict.fromkeys(section.unjudged or TOO_FEW for section in sections if section.claims)
+        return (f"No claim is judged ({len(claims)} asked): {'; '.join(why)}. The tables hold what was measured.",)
     lines = []
     for further, whose in ((False, "the paper's claims"), (True, "further claims")):
         by_learner: dict[str, list[Claim]] = {}

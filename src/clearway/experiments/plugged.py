@@ -59,7 +59,7 @@ def _fault(section: object, name: str, scenes: Sequence[str]) -> str:
         given = getattr(section, called)
         if not isinstance(given, tuple) or not all(isinstance(part, kind) for part in given):
             return f"its section's {called} are {given!r:.60}, expected a tuple of {kind.__name__}"
-    texts = (section.title, section.text, *(claim.text for claim in section.claims))
+    texts = (section.title, section.text, section.unjudged, *(claim.text for claim in section.claims))
     if others := [text for text in texts if not isinstance(text, str)]:
         return f"its section has {others[0]!r:.60} where a text is expected"
     if wrong := [part.name for part in (*section.tables, *section.pictures) if not is_name(part.name)]:

@@ -163,6 +163,8 @@ class Section:
         tables, figures, maps, claims: what came of it.
         missing: runs that are not complete, by name; `clearway reproduce` fills it in from the jobs, of which there may
             be fewer: a section that has none to offer names them itself.
+        unjudged: why its claims are not judged where they are not, in words that end a sentence; empty: runs of a kind
+            are too few.
     """
 
     name: str
@@ -173,6 +175,7 @@ class Section:
     maps: tuple[ReportMap, ...] = ()
     claims: tuple[Claim, ...] = ()
     missing: tuple[str, ...] = ()
+    unjudged: str = ""
 
     @property
     def pictures(self) -> tuple[ReportFigure | ReportMap, ...]:
