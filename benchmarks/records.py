@@ -25,7 +25,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from clearway.errors import ClearwayError
+from clearway.errors import ClearwayError, reason_of
 from clearway.experiments.job import RUNS, TRIALS
 from clearway.experiments.reproduce import REQUEST_FILE
 from clearway.experiments.setting import SCENES
@@ -59,12 +59,21 @@ def pack(folder: Path, record: Path, parts: Sequence[str] = (SCENES, RUNS)) -> N
 
 
 def unpack(records: Sequence[Path], folder: Path) -> None:
-    """Make the folder of one or more records, which must not be there yet; whole, or not at all."""
+    """Make the folder of one or more records, which must not be there yet; whole, or not at all.
+
+    Raises:
+        TarError: a file is no record, or a damaged one.
+        OSError: a file cannot be read, or the folder cannot be written.
+    """
     with folder_written_whole(folder) as part:
         for record in records:
-            with tarfile.open(record, "r:xz") as archive:
-                for member in archive:
-                    _extract(archive, member, part)
+            try:
+                with tarfile.open(record, "r:xz") as archive:
+                    for member in archive:
+                        _extract(archive, member, part)
+            except (EOFError, tarfile.TarError, lzma.LZMAError) as error:
+                told = f"{record}: {reason_of(error)}, expected a .tar.xz file that records.py pack wrote"
+                raise tarfile.TarError(told) from error
 
 
 def _extract(archive: tarfile.TarFile, member: tarfile.TarInfo, folder: Path) -> None:
@@ -149,7 +158,7 @@ def main() -> None:
     else:
         try:
             unpack(args.source, args.made)
-        except (OSError, EOFError, tarfile.TarError, lzma.LZMAError) as error:
+        except (OSError, tarfile.TarError) as error:
             sys.exit(f"error: {error}. Name records of docs/records, and a new folder")
         except KeyboardInterrupt:
             sys.exit("interrupted: nothing was unpacked")

@@ -2,6 +2,7 @@
 
 import io
 import json
+import random
 import runpy
 import shutil
 import tarfile
@@ -105,6 +106,12 @@ def test_the_same_folder_gives_the_same_bytes(folder: Path, tmp_path: Path) -> N
     [
         (("unpack", "nowhere.tar.xz", "new"), "nowhere.tar.xz'. Name records"),
         (("unpack", "no.tar.xz", "new"), "Name records of docs/records, and a new folder"),
+        (
+            ("unpack", "good.tar.xz", "no.tar.xz", "new"),
+            r"error: no\.tar\.xz: not an lzma file, expected a \.tar\.xz file that records\.py pack wrote\. Name",
+        ),
+        (("unpack", "good.tar.xz", "cut.tar.xz", "new"), r"error: cut\.tar\.xz: .*, expected a \.tar\.xz file"),
+        (("unpack", "bent.tar.xz", "new"), r"error: bent\.tar\.xz: .*, expected a \.tar\.xz file"),
         (("pack", ".", "new.tar.xz"), "no reproduction here"),
         (("pack", "twice", "new.tar.xz"), "twice: two of its scenes' files have one name"),
         (("pack", "empty", "new.tar.xz"), "empty: holds no scenes and no runs to pack"),
@@ -116,6 +123,13 @@ def test_what_is_no_record_is_refused_and_leaves_nothing(
     words: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "no.tar.xz").write_text("no archive")
+    with tarfile.open(tmp_path / "good.tar.xz", "w:xz") as archive:
+        member = tarfile.TarInfo("a.json")
+        member.size = 5_000
+        archive.addfile(member, io.BytesIO(random.Random(0).randbytes(member.size)))
+    good = (tmp_path / "good.tar.xz").read_bytes()
+    (tmp_path / "cut.tar.xz").write_bytes(good[:3_000])
+    (tmp_path / "bent.tar.xz").write_bytes(good[:2_000] + bytes(100) + good[2_100:])
     for name, content in (("twice", {"dumps": ["a/hall.h5", "b/hall.h5"]}), ("empty", {"dumps": []}), ("damaged", {})):
         (tmp_path / name).mkdir()
         (tmp_path / name / REQUEST_FILE).write_text(json.dumps(content))
