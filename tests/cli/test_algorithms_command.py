@@ -110,7 +110,10 @@ def test_who_sees_pictures_is_filmed_and_drawn_by_the_scenes_of_its_run(clearway
             ("--algorithm", "q-learning", "--feature-basis", 8),
             ("--feature-basis: q-learning has no setting", "Leave it out"),
         ),
-        (("--preset", "paper", "--set", "epochs=2"), ("epochs=2", "a2c's settings")),
+        (
+            ("--preset", "paper", "--set", "epochs=2"),
+            ("epochs=2", "paper's settings", "epochs is a setting of default, ppo, "),
+        ),
         (("--algorithm", "bc", "--set", "ratio_clip=0.1"), ("ratio_clip=0.1", "bc's settings")),
     ],
 )

@@ -210,6 +210,7 @@ def test_scenes_without_features_are_refused(clearway, dumps: Path, tmp_path: Pa
         (("--workers", 0), "workers"),
         (("--threads", 0), "threads"),
         (("--set", "nosuch=1"), "--set nosuch=1: expected name=value"),
+        (("--set", "epochs=2"), "--set epochs=2: expected name=value with a name among paper's settings: frames, "),
         (("--set", "frames=5"), "--set frames=5: frames are the budget's. Give --frames"),
     ],
 )

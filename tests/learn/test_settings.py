@@ -27,6 +27,20 @@ def test_a_setting_that_the_algorithm_lacks_is_refused_with_the_names_of_those_i
             with_settings(learner, [word])
 
 
+def test_a_setting_of_other_learners_is_told_with_their_names_and_the_one_that_was_asked_for() -> None:
+    told = (
+        r"a name among paper's settings: frames, .*\. epochs is a setting of default, ppo, .*recurrent.*\. Correct it$"
+    )
+    with pytest.raises(RunError, match=told) as caught:
+        with_settings(PAPER_A2C, ["epochs=2"], "paper")
+    of = str(caught.value).partition("epochs is a setting of ")[2]
+    assert "a2c" not in of and "paper" not in of
+    for word, hint in (("epoch=2", r"\. Correct it$"), ("env=2", r"\. Did you mean envs\? Correct it$")):
+        with pytest.raises(RunError, match=hint) as caught:
+            with_settings(PAPER_A2C, [word])
+        assert "is a setting of" not in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -186,7 +186,8 @@ class Train:
         from clearway.learn.presets import PRESETS
         from clearway.learn.settings import with_settings
 
-        learner = chosen_learner(self._adapted() or self.algorithm or self.preset or "default")
+        called = self._adapted() or self.algorithm or self.preset or "default"
+        learner = chosen_learner(called)
         if self.algorithm is not None and self.preset is not None:
             if self.algorithm in PRESETS:
                 raise ClearwayError(f"--algorithm {self.algorithm} is a preset itself. Leave --preset out")
@@ -197,7 +198,7 @@ class Train:
             if name not in setting_names(type(learner)):
                 option = f"--{name.replace('_', '-')}"
                 raise ClearwayError(f"{option}: {learner.algorithm} has no setting {name}. Leave it out")
-        return with_settings(chosen_learner(learner, self.frames, given), self.set)
+        return with_settings(chosen_learner(learner, self.frames, given), self.set, called)
 
 
 def _say_trained(result: TrainResult, out: Path) -> None:

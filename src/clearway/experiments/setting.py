@@ -156,7 +156,7 @@ def changed_learners(names: Sequence[LearnerName], budget: Budget, changes: Sequ
     for change in changes:
         if change.partition("=")[0] == "frames":
             raise RunError(f"--set {change}: frames are the budget's. Give --frames")
-    return {name: with_settings(_budgeted(name, budget), changes) for name in names}
+    return {name: with_settings(_budgeted(name, budget), changes, name) for name in names}
 
 
 def _room_files(out: Path, budget: Budget, encoder: str, build: bool, show_progress: bool) -> list[Path]:

@@ -8,16 +8,23 @@ from dataclasses import replace
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from clearway.errors import RunError
+from clearway.learn.algorithms import ALGORITHMS
 from clearway.learn.kinds import UNIONS, field_types
-from clearway.learn.learner import Learner
+from clearway.learn.learner import Learner, setting_names
 from clearway.learn.plugged import faults_of
+from clearway.learn.presets import PRESETS
 from clearway.spelling import NULL, did_you_mean, unquoted, whole_number
 
 Kind = TypeVar("Kind", bound=Learner)
 
 
-def with_settings(learner: Kind, words: Sequence[str]) -> Kind:
+def with_settings(learner: Kind, words: Sequence[str], called: str | None = None) -> Kind:
     """The learner with settings such as "envs=200" changed.
+
+    Args:
+        learner: to be changed.
+        words: name=value each.
+        called: by which name the user asked for the learner; None: its algorithm's.
 
     Raises:
         RunError: a word is not name=value or names no setting, its value has the wrong type, or the settings cannot
@@ -28,14 +35,23 @@ def with_settings(learner: Kind, words: Sequence[str]) -> Kind:
     for word in words:
         name, equals, text = word.partition("=")
         if not equals or name not in types:
-            names = f"a name among {learner.algorithm}'s settings: {', '.join(types)}"
-            raise RunError(f"--set {word}: expected name=value with {names}.{did_you_mean(name, types)} Correct it")
+            names = f"a name among {called or learner.algorithm}'s settings: {', '.join(types)}"
+            hint = _whose(name) if equals and name not in types else ""
+            hint = hint or did_you_mean(name, types)
+            raise RunError(f"--set {word}: expected name=value with {names}.{hint} Correct it")
         try:
             changes[name] = _parsed(text, types[name])
         except ValueError as fault:
             raise RunError(f"--set {word}: expected {_expected(types[name])}. Correct it") from fault
     with faults_of(learner, "settings"):
         return replace(learner, **changes)
+
+
+def _whose(name: str) -> str:
+    """The sentence " NAME is a setting of LEARNERS.", of presets and algorithms of ours; empty where none has it."""
+    kinds = {preset: type(learner) for preset, learner in PRESETS.items()} | ALGORITHMS
+    found = [known for known, kind in kinds.items() if name in setting_names(kind)]
+    return f" {name} is a setting of {', '.join(found)}." if found else ""
 
 
 def _parsed(text: str, wanted: Any) -> object:
