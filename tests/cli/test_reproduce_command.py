@@ -25,7 +25,7 @@ from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.groups import all_jobs, compared
 from clearway.experiments.plan import Job
 from clearway.experiments.reproduce import ReproduceRequest
-from clearway.experiments.section import Section
+from clearway.experiments.section import Claim, Section
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.reward import RewardError
@@ -337,12 +337,35 @@ def test_other_frames_and_rooms_show_on_top() -> None:
 def test_a_smoke_run_of_more_frames_learns_something() -> None:
     smoke = BUDGETS["smoke"]
     for few in (None, 100, smoke.frames + 1, 99_999):
-        assert smoke.changed(frames=few).warning(1).endswith("its trainings end before anything is learnt.")
+        told = f"after {few or smoke.frames:,} frames in the main experiment, before anything is learnt."
+        assert smoke.changed(frames=few).warning(1).endswith(f"and judges nothing: its trainings end, {told}")
+    assert "after 400 to 12,000 frames" in replace(smoke, default_frames=400).warning(1)
     assert "before anything is learnt" not in smoke.changed(frames=100_000).warning(1)
     assert smoke.changed(frames=5_000_000).warning(4) == (
         "Less than the paper's budget: 5,000,000 frames in the main experiment instead of the paper's 10,000,000; "
         "10 episodes a target instead of 100, of 500 steps at most."
     )
+
+
+def test_what_learns_nothing_is_not_judged(clearway, first, out: Path, small, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reproduce, "run_jobs", lambda *_, **__: None)
+    claims = (
+        Claim("paper: less", "holds", "0 against 1.", p=0.01),
+        Claim("paper: all", "holds", "4 of 4.", counted=True),
+    )
+    judging = replace(EXPERIMENTS["fig5"], section=lambda setting: Section("fig5", "Five", "", claims=claims))
+    monkeypatch.setitem(EXPERIMENTS, "fig5", judging)
+    words = ("reproduce", "fig5", *first.words, "--learners", "default", "--out", out, "--frames")
+    few, many = clearway(*words, 99_999), clearway(*words, 100_000)
+    assert [claim["verdict"] for claim in many.json["sections"][0]["claims"]] == ["holds", "holds"]
+    found = few.json["sections"][0]["claims"]
+    assert {(claim["verdict"], claim["p"], claim["counted"]) for claim in found} == {("undecided", None, False)}
+    assert [claim["evidence"] for claim in found] == [f"{claim.evidence} Not judged: a smoke run." for claim in claims]
+    assert "after 99,999 frames" in few.json["warning"]
+    clearway(*words, 99_999)
+    told = "- No claim is judged (2 asked): a smoke run's trainings end before anything is learnt. The tables hold"
+    report = (out / "report.md").read_text()
+    assert told in report and "holds" not in report
 
 
 def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:

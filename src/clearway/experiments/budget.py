@@ -27,7 +27,8 @@ class Budget:
         unseen_targets: tried at each distance in a scene, at most.
         most_scenes: scenes taken of a folder of dumps; None: all.
         whole_grid: solve all settings of the analysis, not a few of them.
-        mark: stands on top of the report, where its figures say nothing; empty for none.
+        mark: stands on top of the report, where its figures say nothing and no claim is judged, "{frames}" for those of
+            the main experiment; empty for none.
     """
 
     name: BudgetName
@@ -55,7 +56,8 @@ class Budget:
     def warning(self, scenes: int) -> str:
         """What stands on top of a report of so many scenes: where it has less of anything than the paper."""
         if self.mark:
-            return self.mark
+            frames = sorted({self.frames, self.default_frames or self.frames})
+            return self.mark.format(frames=" to ".join(f"{count:,}" for count in frames))
         found = []
         if scenes < len(PAPER.rooms):
             found.append(f"{scenes} of {len(PAPER.rooms)} scenes")
@@ -83,7 +85,8 @@ SMOKE = Budget(
     whole_grid=False,
     mark=(
         "Smoke budget: shows that everything runs here, and what a report looks like. It cannot show which agent is "
-        "better: its trainings end before anything is learnt."
+        "better, and judges nothing: its trainings end, after {frames} frames in the main experiment, before anything "
+        "is learnt."
     ),
 )
 """Shows within minutes that everything runs; its figures say nothing about the paper."""

@@ -31,6 +31,21 @@ def corrected(section: Section) -> Section:
     return replace(section, claims=tuple(claims))
 
 
+def not_judged(section: Section, why: str, evidence: str) -> Section:
+    """The section without verdicts.
+
+    Args:
+        section: with claims.
+        why: as a section's `unjudged` says it.
+        evidence: a sentence, behind each claim's own.
+    """
+    claims = (
+        replace(claim, verdict="undecided", p=None, counted=False, evidence=f"{claim.evidence} {evidence}".strip())
+        for claim in section.claims
+    )
+    return replace(section, claims=tuple(claims), unjudged=why)
+
+
 def holm(p: Sequence[float]) -> list[float]:
     """Corrected p of each claim, 1 at most."""
     found, largest = [0.0] * len(p), 0.0

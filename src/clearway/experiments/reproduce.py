@@ -12,7 +12,7 @@ from clearway.errors import PluginError, RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS, experiment, in_order
-from clearway.experiments.correction import corrected
+from clearway.experiments.correction import corrected, not_judged
 from clearway.experiments.expected_time import told_time
 from clearway.experiments.job import is_done, unfinished
 from clearway.experiments.jobs import affordable_workers, run_jobs
@@ -46,6 +46,8 @@ class Reproduction:
 
 REQUEST_FILE = "reproduction.json"
 HOW_NOT_WHAT = ("out", "workers", "threads", "ray")  # parts of a request that a report does not depend on
+LEARNS_NOTHING = "a smoke run's trainings end before anything is learnt"
+SMOKE_RUN = "Not judged: a smoke run."
 WHO_ASKED = ("names", "commands", "packages")  # parts that may differ between requests of one report
 
 
@@ -193,7 +195,8 @@ def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
         for found in map(experiment, _known(request)):
             own = found.jobs(setting)
             missing = unfinished(setting.out, own)  # before it is read: a run that ends meanwhile may be left out of it
-            section = corrected(found.section(setting))
+            section = found.section(setting)
+            section = not_judged(section, LEARNS_NOTHING, SMOKE_RUN) if setting.budget.mark else corrected(section)
             sections.append(replace(section, missing=tuple(dict.fromkeys((*missing, *section.missing)))))
             jobs += own
     _check_files(sections)
