@@ -83,6 +83,7 @@ def test_workers_import_the_terms_of_a_reward(corridor, tmp_path, monkeypatch) -
     monkeypatch.setattr(turning.Turning, "__module__", "__main__")
     request = RunRequest(rooms, {room.name: [8] for room in rooms}, small_learner(), turning.REWARD)
     request.check(workers=1, ray="local")
+    monkeypatch.setattr(own_terms.sys.modules["__main__"], "__file__", "program.py", raising=False)
     request.check(workers=2)
     with pytest.raises(RewardError, match="its term Turning stands in the program that was started"):
         request.check(workers=2, ray="local")

@@ -60,7 +60,7 @@ def test_a_refusal_without_a_frame_is_one_line_too():
         (("--set", "envs"), ("--set envs", "name=value")),
         (("--set", "envs=many"), ("--set envs=many",)),
         (("--set", "envs=20", "clip_rewards=maybe"), ("clip_rewards=maybe", "true or false")),
-        (("--set", "algorithm=magic"), ("algorithm=magic", "ppo")),
+        (("--set", "algorithm=magic"), ("algorithm=magic", "default's settings")),
         (("--set", "discount=1.5"), ("discount is 1.5",)),
         (("--set", "rolout_steps=8"), ("--set rolout_steps=8", "Did you mean rollout_steps?")),
         (("--set", "envs=2.5"), ("--set envs=2.5", "a whole number")),
