@@ -132,7 +132,8 @@ def test_runs_and_experiments_of_one_s_own(tmp_path: Path, monkeypatch, capsys) 
     assert "probability of improvement" in capsys.readouterr().out
     (claim,) = left["found"].sections[0].claims
     assert claim.p is not None and not left["found"].sections[0].missing
-    assert claim.text in Path("mine/report.md").read_text()
+    report = Path("mine/report.md").read_text()
+    assert claim.text in report and f"bathroom ({scene.state_count} poses)" in report and "0, 1, 2, 3" in report
     assert len(list(Path("mine/runs").iterdir())) == 8
     monkeypatch.undo()
     with pytest.raises(RunError, match=r"asks for experiment 'mine', which nothing .* run the program that made this"):

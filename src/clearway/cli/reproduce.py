@@ -125,32 +125,11 @@ class Report:
 
 def _write(found: Reproduction, out: Path, as_json: bool) -> None:
     """Write the report into a folder and say where it is, or print it."""
-    from clearway.experiments.provenance import made_by
-    from clearway.experiments.setting import ABOUT_LEARNERS
     from clearway.files import read_json
-    from clearway.viz.report import JSON, MARKDOWN, write_report
+    from clearway.viz.report import JSON, MARKDOWN
+    from clearway.viz.reproduction_report import write_reproduction
 
-    setting = found.setting
-    budget = setting.budget
-    learners = (
-        f"{name}: {ABOUT_LEARNERS[name]}{', changed' * bool(found.changes)}, {learner.frames:,} frames"
-        for name, learner in setting.learners.items()
-    )
-    changed = f"Changed in every learner compared: {', '.join(found.changes)}." if found.changes else ""
-    warning = " ".join(filter(None, (budget.warning(len(setting.scenes)), changed)))
-    facts = {
-        "commands": "; ".join(found.commands),
-        "scenes": ", ".join(f"{scene.name} ({scene.state_count} poses)" for scene in setting.scenes),
-        "features": setting.encoder,
-        "seeds": ", ".join(map(str, setting.seeds)),
-        "on the grid": (
-            f"{budget.episodes_per_target} episodes a target, at most {budget.step_limit:,} steps where a section does "
-            "not say otherwise"
-        ),
-        "learners": "; ".join(learners),
-        **made_by(out, found.jobs),
-    }
-    page = write_report(out, "The paper's experiments, redone", found.sections, facts, warning, setting.scenes)
+    page = write_reproduction(found)
     if as_json:
         print_json(read_json(out / JSON))
     say(f"report: {page} and {out / MARKDOWN}")
