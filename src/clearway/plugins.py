@@ -31,7 +31,7 @@ BUILT_IN: dict[Kind, tuple[str, ...]] = {
     "experiments": (
         *("table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "analysis", "memory", "quality"),
         *("zones-or-step", "shuffles", "step-size", "zone-time", "zone-levels", "ablations"),
-        *("across-rooms", "perturbed", "off-grid", "all"),
+        *("across-rooms", "perturbed", "off-grid", "rewards", "all"),
     ),
 }
 """Names that are ours, which no other package can take."""

@@ -212,10 +212,17 @@ def test_scenes_without_features_are_refused(clearway, dumps: Path, tmp_path: Pa
         (("--set", "nosuch=1"), "--set nosuch=1: expected name=value"),
         (("--set", "epochs=2"), "--set epochs=2: expected name=value with a name among paper's settings: frames, "),
         (("--set", "frames=5"), "--set frames=5: frames are the budget's. Give --frames"),
+        (("--rewards", "shortest", "bump"), "rewards are those of the experiment rewards. Name it, too"),
     ],
 )
-def test_counts_below_one_are_refused(clearway, words: tuple, part: str, tmp_path: Path) -> None:
+def test_what_cannot_be_asked_is_refused(clearway, words: tuple, part: str, tmp_path: Path) -> None:
     assert clearway("reproduce", "table1", "--out", tmp_path / "out", *words).refusal(part)
+    assert not (tmp_path / "out").exists()
+
+
+def test_rewards_that_nobody_knows_are_refused(clearway, tmp_path: Path) -> None:
+    answer = clearway("reproduce", "rewards", "--out", tmp_path / "out", "--rewards", "shortest", "bumb")
+    assert answer.refusal("reward='bumb' is unknown. Did you mean bump?")
     assert not (tmp_path / "out").exists()
 
 

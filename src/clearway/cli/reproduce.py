@@ -31,8 +31,8 @@ class Reproduce:
 
     names: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Some of table1, fig3, fig4, table2, table3, fig5, fig6, analysis, memory, quality, zones-or-step, shuffles,
-    step-size, zone-time, zone-levels, ablations, across-rooms, perturbed, off-grid; all: each of these; or those of
-    installed packages (clearway plugins)."""
+    step-size, zone-time, zone-levels, ablations, across-rooms, perturbed, off-grid, rewards; all: each of these; or
+    those of installed packages (clearway plugins)."""
     out: Path = Path("reproduction")
     """Folder of scenes, runs and the report."""
     budget: BudgetName = "smoke"
@@ -51,6 +51,9 @@ class Reproduce:
     """Of the agents: --seeds 5 --first-seed 5 trains those of seeds 5 to 9, which an answer in hand has not seen."""
     learners: tuple[LearnerName, ...] = ("paper", "default")
     """paper: the paper's settings, synchronous; paper-a3c: asynchronous, far slower; default: the recipe."""
+    rewards: tuple[str, ...] = ()
+    """Of the experiment rewards, the first against each other one: names as of clearway train --reward, also your own
+    as package.module:name; by default shortest, collision-aware, bump, clearance."""
     set: tuple[str, ...] = ()
     """Single settings of every learner, for example --set lr_start=0.002 (all: docs/learning.md)."""
     workers: int | None = None
@@ -92,6 +95,7 @@ class Reproduce:
             seeds=self.seeds,
             first_seed=self.first_seed,
             learners=list(dict.fromkeys(self.learners)),
+            rewards=self.rewards,
             changes=self.set,
             workers=self.workers,
             threads=self.threads,

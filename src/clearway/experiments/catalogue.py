@@ -18,6 +18,7 @@ from clearway.experiments import (
     off_grid,
     perturbed,
     quality,
+    rewards,
     shuffles,
     step_size,
     table1,
@@ -49,6 +50,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     "across-rooms": Experiment(across_rooms.jobs, across_rooms.section),
     "perturbed": Experiment(perturbed.jobs, perturbed.section),
     "off-grid": Experiment(off_grid.jobs, off_grid.section),
+    "rewards": Experiment(rewards.jobs, rewards.section),
 }
 """Ours. A program may add its own, which it alone knows then; what a package offers, every command knows."""
 

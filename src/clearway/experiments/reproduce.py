@@ -255,6 +255,7 @@ def _setting(request: ReproduceRequest, *, build: bool = True, show_progress: bo
         seeds=request.seeds,
         first_seed=request.first_seed,
         learners=request.learners,
+        rewards=request.rewards,
         changes=request.changes,
         build=build,
         show_progress=show_progress,

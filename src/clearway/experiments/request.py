@@ -27,6 +27,7 @@ class ReproduceRequest:
         seeds: how many; None: as the budget says.
         first_seed: of them; the others follow it.
         learners: names among `setting.LEARNERS`.
+        rewards: names of those that the experiment `rewards` compares, see `reward.reward_named`; none: shipped ones.
         changes: of settings of every learner, such as "lr_start=0.002".
         workers: jobs side by side; None: as many as cores and memory allow.
         threads: of each job.
@@ -50,6 +51,7 @@ class ReproduceRequest:
     seeds: int | None = None
     first_seed: int = 0
     learners: Sequence[LearnerName] = ("paper", "default")
+    rewards: Sequence[str] = ()
     changes: Sequence[str] = ()
     workers: int | None = None
     threads: int = 1
@@ -65,11 +67,15 @@ class ReproduceRequest:
         _check_words("learners", self.learners, get_args(LearnerName))
         if self.rooms is not None:
             _check_words("rooms", self.rooms, get_args(RoomName))
-        for name in ("names", "changes", "commands"):
+        for name in ("names", "rewards", "changes", "commands"):
             if others := [text for text in _listed(name, getattr(self, name)) if not isinstance(text, str)]:
                 raise ArgumentError(f"{name}: holds {others[0]!r:.40}, expected texts. Correct it")
         if not self.names:
             raise ArgumentError("names: no experiment is named. Name some")
+        if self.rewards and "rewards" not in self.names:
+            raise ArgumentError("rewards are those of the experiment rewards. Name it, too, or leave them out")
+        if self.rewards and len({*self.rewards}) < max(2, len(self.rewards)):
+            raise ArgumentError(f"rewards={list(self.rewards)!r:.80}: expected two or more, each once. Correct it")
         for name, least in (("frames", 1), ("seeds", 1), ("first_seed", 0), ("workers", 1), ("threads", 1)):
             _check_number(name, getattr(self, name), least, optional=name not in ("first_seed", "threads"))
         for name, text in (("encoder", self.encoder), ("ray", self.ray or "")):

@@ -15,7 +15,7 @@ from clearway.learn.learner import Learner
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.settings import with_settings
 from clearway.perception import encode_scenes
-from clearway.reward import Reward
+from clearway.reward import Reward, RewardError, reward_named
 from clearway.rooms.library import cached_room_scene
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene, encoder_names
@@ -49,6 +49,7 @@ class Setting:
         budget: see there.
         seeds: of the agents.
         learners: the learners to be compared, by name.
+        rewards: to be compared by the experiment `rewards`; none: shipped ones.
     """
 
     out: Path
@@ -58,6 +59,7 @@ class Setting:
     budget: Budget
     seeds: tuple[int, ...]
     learners: Mapping[str, Learner]
+    rewards: tuple[Reward, ...] = ()
 
     @property
     def original(self) -> bool:
@@ -105,6 +107,7 @@ def prepare(
     seeds: int | None = None,
     first_seed: int = 0,
     learners: Sequence[LearnerName],
+    rewards: Sequence[str] = (),
     changes: Sequence[str] = (),
     build: bool = True,
     show_progress: bool = False,
@@ -119,6 +122,7 @@ def prepare(
         seeds: how many; None: as the budget says.
         first_seed: of them; the others follow it.
         learners: names among `LEARNERS`.
+        rewards: names, see `reward_named`.
         changes: of settings of every learner, such as "lr_start=0.002".
         build: False refuses default rooms that are not there yet.
         show_progress: draw progress bars.
@@ -126,7 +130,9 @@ def prepare(
     Raises:
         SceneError: a dump cannot be read or has no features; or a room is not there, and none is to be built.
         RunError: as of `changed_learners`.
+        RewardError: as of `reward_named`; or two rewards are called alike.
     """
+    compared = _rewards(rewards)
     own = changed_learners(learners, budget, changes)
     paths = list(dumps)[: budget.most_scenes] if dumps else _room_files(out, budget, encoder, build, show_progress)
     scenes = tuple(read_scene(path) for path in paths)
@@ -144,7 +150,15 @@ def prepare(
         budget=budget,
         seeds=tuple(range(first_seed, first_seed + (budget.seeds if seeds is None else seeds))),
         learners=own,
+        rewards=compared,
     )
+
+
+def _rewards(names: Sequence[str]) -> tuple[Reward, ...]:
+    found = {reward.name: reward for reward in map(reward_named, names)}
+    if len(found) < len(names):
+        raise RewardError(f"rewards {', '.join(names)}: two are called alike, of {', '.join(found)}. Rename one")
+    return tuple(found.values())
 
 
 def changed_learners(names: Sequence[LearnerName], budget: Budget, changes: Sequence[str]) -> dict[str, Learner]:

@@ -1,0 +1,122 @@
+"""Rewards of whoever asks, each against the first of them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clearway.errors import ArgumentError
+from clearway.evaluation.metrics import METRIC_NAMES
+from clearway.experiments import rewards
+from clearway.experiments.correction import corrected
+from clearway.experiments.groups import Group, Scores
+from clearway.experiments.job import episodes_of
+from clearway.experiments.reproduce import ReproduceRequest, planned
+from clearway.experiments.section import Claim
+from clearway.experiments.setting import Setting, prepare
+from clearway.reward import BUMP, CLEARANCE, SHORTEST, RewardError
+from helpers.own_terms import imported
+from helpers.report_tables import by_heading
+from helpers.small_setting import do_here, small_setting
+
+
+@pytest.fixture
+def setting(tmp_path: Path) -> Setting:
+    """One learner, five seeds, three rewards."""
+    setting = small_setting(tmp_path, seeds=5)
+    return replace(setting, learners={"paper": setting.learners["paper"]}, rewards=(BUMP, CLEARANCE, SHORTEST))
+
+
+def test_figures_are_those_of_the_rewards_own_agents(setting: Setting) -> None:
+    own = replace(setting, seeds=(0, 1), rewards=(CLEARANCE, BUMP))
+    jobs = planned(own, [rewards.NAME])
+    agents = [job for job in jobs if job.run.reward in own.rewards]
+    assert [job.run.reward for job in agents] == [CLEARANCE] * 2 + [BUMP] * 2
+    do_here(own.out, jobs, threads=1)
+    section = rewards.section(own)
+    rows = {row["agent"]: row for row in by_heading(section.tables[0]) if row["figure"] == "collisions"}
+    for name in ("clearance", "bump"):
+        found = [episodes_of(own.out, job.run, job.trials[0]) for job in agents if job.run.reward.name == name]
+        by_target = [[each.collisions[each.target == target].mean() for target in range(5)] for each in found]
+        means = [(np.mean(run[:3]) + np.mean(run[3:])) / 2 for run in by_target]  # scene by scene
+        assert rows[name]["average"] == pytest.approx(np.mean(means))
+    assert "judged against the first, clearance" in section.text
+    assert [row["agent"] for row in by_heading(section.tables[-1])] == ["clearance", "bump"]
+
+
+def test_shipped_rewards_are_compared_where_none_are_named(setting: Setting) -> None:
+    jobs = planned(replace(setting, seeds=(0,), rewards=()), [rewards.NAME])
+    assert {job.run.reward.name for job in jobs} == {"shortest", "collision-aware", "bump", "clearance"}
+
+
+@pytest.fixture
+def judged(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, Claim]]:
+    """The claims where figures rise from reward to reward, in the order that the setting names them."""
+
+    def claims(arrives: float) -> dict[str, Claim]:
+        def scores(group: Group, out: Path, count: int) -> Scores:
+            place = ("bump", "clearance", "shortest").index(group.agent)
+            values = np.ones((5, count, len(METRIC_NAMES)))
+            apart = 0.001 * np.arange(5)[:, None]
+            values[:, :, METRIC_NAMES.index("collisions")] = (0.2, 0.1, 0.3)[place] + apart
+            values[:, :, METRIC_NAMES.index("steps")] = (10.0, 10.1, 12.0)[place] + apart
+            values[:, :, METRIC_NAMES.index("success")] = arrives if group.agent == "clearance" else 1.0
+            return Scores(tuple(range(5)), values)
+
+        def frames(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:
+            return (100.0 if group.agent == "bump" else 90.0) + np.arange(5.0)[:, None], 5
+
+        monkeypatch.setattr(Group, "scores", scores)
+        monkeypatch.setattr(rewards, "frames_until_settled", frames)
+        return {claim.text: claim for claim in corrected(rewards.section(setting)).claims}
+
+    return claims
+
+
+def test_each_reward_is_judged_against_the_first(judged: Callable[..., dict[str, Claim]]) -> None:
+    claims = judged(1.0)
+    assert {text.removeprefix("paper: "): claim.verdict for text, claim in claims.items()} == {
+        "clearance, fewer collisions than bump": "holds",
+        "clearance, no more steps than bump": "holds",  # within 2 %
+        "clearance, settles sooner than bump": "holds",
+        "shortest, fewer collisions than bump": "does not hold",
+        "shortest, no more steps than bump": "does not hold",
+        "shortest, settles sooner than bump": "holds",
+    }
+    assert all(claim.further for claim in claims.values())
+
+
+def test_agents_that_arrive_less_often_win_nothing(judged: Callable[..., dict[str, Claim]]) -> None:
+    found = judged(0.9)
+    assert found["paper: clearance, fewer collisions than bump"].verdict == "undecided"
+    assert found["paper: clearance, settles sooner than bump"].verdict == "holds"  # misses are counted there
+
+
+def test_rewards_of_one_s_own_are_asked_for_by_name(setting: Setting, tmp_path: Path, monkeypatch) -> None:
+    module = imported(tmp_path / "turning.py", monkeypatch)
+    given = {"encoder": "auto", "learners": ["paper"], "dumps": [scene.path for scene in setting.files]}
+    own = prepare(tmp_path, setting.budget, rewards=["shortest", "own_turning:REWARD"], **given)
+    assert own.rewards == (SHORTEST, module.REWARD)
+    with pytest.raises(RewardError, match="rewards bump, clearance_of_package, bump2: two are called alike") as refusal:
+        monkeypatch.setattr(
+            "clearway.experiments.setting.reward_named", lambda name: CLEARANCE if name != "bump" else BUMP
+        )
+        prepare(tmp_path, setting.budget, rewards=["bump", "clearance_of_package", "bump2"], **given)
+    assert "Rename one" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("names", "asked", "said"),
+    [
+        (["table1"], ["shortest", "bump"], "those of the experiment rewards. Name it, too, or leave them out"),
+        (["rewards"], ["bump"], r"rewards=\['bump'\]: expected two or more, each once"),
+        (["rewards"], ["bump", "shortest", "bump"], "expected two or more, each once"),
+        (["rewards"], "bump", "rewards='bump': expected a list"),
+        (["rewards"], ["bump", 3], "rewards: holds 3, expected texts"),
+    ],
+)
+def test_a_request_that_compares_nothing_is_refused(names, asked, said, tmp_path: Path) -> None:
+    with pytest.raises(ArgumentError, match=said):
+        ReproduceRequest(names, tmp_path, "smoke", rewards=asked)
