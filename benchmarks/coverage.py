@@ -33,6 +33,7 @@ def _far(rng: np.random.Generator, runs: int) -> np.ndarray:
     return rng.normal(size=(runs, 1)) + FAR * ((rng.random((runs, 1)) < 0.1) - 0.1)
 
 
+NARROW = 0.1  # standard deviations
 DRAWS: dict[str, Draw] = {"normal": _normal, "lognormal, sigma 1": _skewed, "one run in ten 10 sd off": _far}
 """Scores of runs, (R, 1), whose mean is 0."""
 
@@ -55,6 +56,17 @@ def shares(draw: Draw, runs: int, times: int) -> tuple[float, float, float]:
     )
 
 
+def beside_a_narrow_kind(draw: Draw, runs: int, times: int) -> tuple[float, float]:
+    """As the last two of `shares`, where the other kind has the same mean and hardly varies."""
+    rng = np.random.default_rng(2)
+    pairs = [(NARROW * _normal(rng, runs), draw(rng, runs)) for _ in range(times)]
+    apart = [difference(one, other, ONE, resamples=RESAMPLES) for one, other in pairs]
+    return (
+        float(np.mean([_holds_zero(own.interval) for own in apart])),
+        float(np.mean([permutation_p(one, other, ONE) <= 0.05 for one, other in pairs])),
+    )
+
+
 def size_of_same_runs(correlation: float, runs: int, times: int) -> float:
     """How often p is at most 5 % where two alike kinds are the same runs twice, of so correlated scores."""
     rng = np.random.default_rng(1)
@@ -69,9 +81,11 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--times", type=int, default=2_000)
     args = parser.parse_args()
-    print(f"{args.runs} runs a kind | interval of a mean holds it | of a difference holds 0 | p <= 5 %")
+    alike, narrow = ("a difference's holds 0", "p <= 5 %"), ("the same beside a narrow kind", "p <= 5 %")
+    print(f"{args.runs} runs a kind", "the mean's interval holds it", *alike, *narrow, sep=" | ")
     for name, draw in DRAWS.items():
-        print(name, *(f"{100 * share:.0f} %" for share in shares(draw, args.runs, args.times)), sep=" | ")
+        found = (*shares(draw, args.runs, args.times), *beside_a_narrow_kind(draw, args.runs, args.times))
+        print(name, *(f"{100 * share:.0f} %" for share in found), sep=" | ")
     print("the same runs twice, correlation | p <= 5 %")
     for correlation in (-0.5, 0.0, 0.5, 0.8):
         print(f"{correlation} | {100 * size_of_same_runs(correlation, args.runs, args.times):.1f} %")

@@ -307,4 +307,4 @@ def test_the_default_recipe_without_a_part_is_what_its_records_come_to(tmp_path:
     (line,) = [row for row in rows_of(RESULTS) if row[0] == "four rooms, seeds 20 to 24"]
     least, most = line[1].split("-")
     assert float(most) < min(steps) and f"takes fewer steps ({least} to {most})" in page
-    assert "In the four rooms it needs whitened features" in RESULTS
+    assert "In the four rooms whitening is needed" in RESULTS

@@ -227,11 +227,10 @@ def test_the_default_of_seeds_5_to_9_is_as_good_as_its_record_says() -> None:
         for name in ("solved_targets", "all")
     )
     assert seconds == (
-        f"all solved after {solved[0]:.0f} to {solved[-1]:.0f}, "
-        f"all criteria (four of five) after {met[0]:.0f} to {met[-1]:.0f}"
+        f"all solved after {solved[0]:.0f} to {solved[-1]:.0f}, all criteria after {met[0]:.0f} to {met[-1]:.0f}"
     )
     assert len(met) == 4 and sum(second <= 300 for second in met) == 3
-    assert "Of [seeds 5 to 9](evidence.md#what-single-parts-bring) three do:" in RESULTS
+    assert "Of [seeds 5 to 9](evidence.md#what-single-parts-bring) three do, a fourth late:" in RESULTS
     performance = (DOCS / "performance.md").read_text(encoding="utf-8")
     assert f"| {solved[0]:.0f} to {solved[-1]:.0f} s, five seeds |" in performance
 
@@ -284,7 +283,8 @@ def test_how_far_intervals_can_be_trusted_is_what_the_benchmark_gives() -> None:
     shown = {name: cells for name, *cells in rows_of(page.partition("| scores of runs |")[2].partition("\n\n")[0])}
     for name, draw in found["DRAWS"].items():
         told = shown[name.replace(" sd ", " standard deviations ")]
-        for cell, share in zip(told, found["shares"](draw, 5, 2_000), strict=True):
+        exact = (*found["shares"](draw, 5, 2_000), *found["beside_a_narrow_kind"](draw, 5, 2_000))
+        for cell, share in zip(told, exact, strict=True):
             assert cell == f"{100 * share:.0f} %", name
     for correlation, words in (
         (0.5, "are told apart in {:.1f} % at a correlation of 0.5"),

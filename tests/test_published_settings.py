@@ -62,8 +62,11 @@ def test_hard_targets_after_2_m_frames_are_level_with_usual_ones(tmp_path: Path)
         assert len(detours[-1]) == 10
     claim = judged_no_more("level", "x shortest paths", *detours, ONE_TARGET)
     hard, usual = (own.mean() for own in detours)
-    told = f"hard ones after 2 M are level: {hard:.3f} against {usual:.3f}, p = {claim.p:.2g}, {claim.verdict} (not reg"
-    assert told in section_of(EVIDENCE, "Hard targets") and claim.verdict == "undecided"
+    apart = claim.numbers["difference"]
+    low, high = apart.interval
+    told = f"{hard:.3f} against {usual:.3f}, difference {apart.value:.3f} ({low:.3f} to {high:.3f}), p = {claim.p:.2g}"
+    assert f"is undecided: {told} with 2 % allowed" in section_of(EVIDENCE, "Hard targets")
+    assert claim.verdict == "undecided"
     assert "no larger than usual ones after 1 M (than those after 2 M: undecided, not registered)" in RESULTS
 
 
@@ -190,8 +193,6 @@ def check_beside_the_eyes(trials: Sequence[tuple[dict[str, Any], int, dict[str, 
     part = section_of((DOCS / "seeing.md").read_text(encoding="utf-8"), "The paper's own network on them")
     walked = set()
     for run, frames, episodes, lost in trials:
-        if frames != 10:
-            continue
         room = np.array([number for number, scene in enumerate(run["scenes"]) for _ in scene["targets"]])
         own = room[episodes["target"]]
         means = [
@@ -200,8 +201,8 @@ def check_beside_the_eyes(trials: Sequence[tuple[dict[str, Any], int, dict[str, 
         ]
         walked.add(sum(steps <= 2 * shortest for steps, shortest in means))
         (line,) = [cells for cells in rows_of(part) if cells[0] == run["reward"]["name"]]
-        assert f"{line[2].partition(';')[0]} of 20" == lost
-    assert walked == {2} and "on a random ResNet-50 two, after 10 M of [20 M frames]" in part
+        assert frames != 10 or f"{line[2].partition(';')[0]} of 20" == lost
+    assert walked == {2} and "on a random ResNet-50 two.** (Which two differs by reward: halfway through [20 M" in part
 
 
 @pytest.mark.slow
