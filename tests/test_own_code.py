@@ -28,6 +28,8 @@ from helpers.own_terms import DEARER, NAME, SOURCE, imported
         ("SHARE = 0.5", "if np.pi > 3:\n    SHARE = 0.6\nelse:\n    SHARE = 0.5"),
         ("SHARE = 0.5", "try:\n    from os import sep as SHARE\nexcept ImportError:\n    SHARE = 0.5"),
         ("UNUSED = 1\n", "UNUSED = 1\nif UNUSED:\n    def rounded(x):\n        return x\n"),
+        ("floor as rounded, ceil", "floor, ceil as rounded"),
+        ("UNUSED = 1\n", "UNUSED = 1\nfrom math import *\n"),
     ],
 )
 def test_what_a_class_uses_of_its_file_is_its_code(edit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,3 +108,29 @@ def test_where_no_process_can_import_a_class_from(monkeypatch: pytest.MonkeyPatc
     assert not_importable(Inner) == not_importable(Inner, main_too=True) == "inside a function"
     assert not_importable(started) == "in the program that was started"
     assert not_importable(started, main_too=True) == not_importable(Zones) == ""
+
+
+def test_form_feeds_end_no_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pages = ("SHARE = 0.5\n", "SHARE = 0.5\n\f\f\n")
+    before = code_of(imported(tmp_path / "before.py", monkeypatch, pages).Turning)
+    assert before != code_of(imported(tmp_path / "after.py", monkeypatch, pages, DEARER).Turning) is not None
+
+
+def test_a_class_that_its_module_holds_no_more_is_not_importable(tmp_path: Path, monkeypatch) -> None:
+    module = imported(tmp_path / "turning.py", monkeypatch)
+    first = module.Turning
+    assert not not_importable(first)
+    monkeypatch.setattr(module, "Turning", type("Turning", (Term,), {"__module__": module.__name__}))
+    assert not_importable(first) == f"where {module.__name__} holds another of its name, or none"
+    monkeypatch.delitem(sys.modules, module.__name__)
+    assert "or none" in not_importable(first)
+
+
+def test_names_of_imports_that_change_places_are_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    used = ("earned * SHARE", "earned * SHARE + other(rounded(SHARE))")
+    one, two = (
+        ("floor as rounded, ceil", names)
+        for names in ("floor as rounded, ceil as other", "floor as other, ceil as rounded")
+    )
+    before = code_of(imported(tmp_path / "before.py", monkeypatch, used, one).Turning)
+    assert before != code_of(imported(tmp_path / "after.py", monkeypatch, used, two).Turning) is not None

@@ -340,3 +340,9 @@ def test_rewards_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_clearance_that_grows_with_distance_or_has_none_is_refused(distance_m: Any) -> None:
     with pytest.raises(RewardError, match="expected more than 0"):
         Clearance(0.02, distance_m)
+
+
+def test_two_terms_that_a_record_could_not_tell_apart_are_refused() -> None:
+    made = [dataclass(frozen=True)(type("Same", (Term,), {"__module__": "mine"})) for _ in range(2)]
+    with pytest.raises(RewardError, match="a term occurs twice"):
+        Reward("both", (made[0](), made[1](), Arrival()))

@@ -6,6 +6,7 @@ import ast
 import hashlib
 import inspect
 import linecache
+import re
 import sys
 from collections.abc import Iterator
 
@@ -36,7 +37,12 @@ def not_importable(kind: type, main_too: bool = False) -> str:
     """
     if "<locals>" in kind.__qualname__:
         return "inside a function"
-    return "in the program that was started" if kind.__module__ == MAIN and not main_too else ""
+    if kind.__module__ == MAIN:
+        return "" if main_too else "in the program that was started"
+    found: object = sys.modules.get(kind.__module__)
+    for name in kind.__qualname__.split("."):
+        found = getattr(found, name, None)
+    return "" if found is kind else f"where {kind.__module__} holds another of its name, or none"
 
 
 def _has_a_version(kind: type) -> bool:
@@ -52,7 +58,7 @@ def _parts(kind: type) -> list[str]:
         found = list(_definitions(text))
     except (SyntaxError, ValueError):
         return []
-    wanted, taken = {kind.__qualname__.partition(".")[0]}, set[int]()
+    wanted, taken = {kind.__qualname__.partition(".")[0], "*"}, set[int]()  # of what `import *` binds nothing is known
     while new := {place for place, (bound, _, _) in enumerate(found) if bound & wanted} - taken:
         taken |= new
         wanted = wanted.union(*(found[place][1] for place in new))
@@ -61,18 +67,19 @@ def _parts(kind: type) -> list[str]:
 
 def _definitions(text: str) -> Iterator[tuple[set[str], set[str], str]]:
     """Every statement of a module, each import alone: the names that it binds or changes, those it uses, its text."""
-    lines = text.splitlines()
+    lines = re.split(r"\r\n|\r|\n", text)  # as `ast` counts them; `splitlines` splits at form feeds, too
     for statement in ast.parse(text).body:
         if isinstance(statement, ast.Import | ast.ImportFrom):
             for alias in statement.names:
-                yield _bound(alias), set(), f"{getattr(statement, 'module', '')}:{alias.name}"
+                level, module = getattr(statement, "level", 0), getattr(statement, "module", None)
+                yield _bound(alias), set(), f"{'.' * level}{module or ''}:{alias.name}:{alias.asname or ''}"
         else:
             first = min([statement.lineno, *(each.lineno for each in getattr(statement, "decorator_list", ()))])
             yield _bound(statement), _names(statement), "\n".join(lines[first - 1 : statement.end_lineno])
 
 
 def _bound(statement: ast.AST) -> set[str]:
-    """Names that a statement binds, or changes something of: `TABLE["turn"] = 3` changes TABLE."""
+    """Names that a statement binds, or changes: `TABLE["turn"] = 3` changes TABLE. Calls are not followed."""
     if isinstance(statement, DEFINITIONS):
         return {statement.name}
     found = set[str]()

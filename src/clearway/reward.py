@@ -212,7 +212,8 @@ class Reward:
                 problem = f"the term {type(term).__name__} keeps what is no field of it, so that no record holds it"
                 raise RewardError(f"reward {self.name}: {problem}. Decorate it with @dataclass(frozen=True)")
         kinds = [type(term) for term in self.terms if not isinstance(term, UnknownTerm)]
-        if len(set(kinds)) < len(kinds):
+        paths = [_path(term) for term in self._others()]
+        if len(set(kinds)) < len(kinds) or len(set(paths)) < len(paths):
             raise RewardError(f"reward {self.name}: a term occurs twice. Give every kind of term once")
         ours = list(TERMS.values())
         places = [ours.index(kind) if kind in ours else len(ours) for kind in map(type, self.terms) if kind != Arrival]

@@ -83,8 +83,12 @@ def test_workers_import_the_terms_of_a_reward(corridor, tmp_path, monkeypatch) -
     monkeypatch.setattr(turning.Turning, "__module__", "__main__")
     request = RunRequest(rooms, {room.name: [8] for room in rooms}, small_learner(), turning.REWARD)
     request.check(workers=1, ray="local")
-    monkeypatch.setattr(own_terms.sys.modules["__main__"], "__file__", "program.py", raising=False)
+    monkeypatch.setattr(own_terms.sys.modules["__main__"], "__file__", __file__, raising=False)
     request.check(workers=2)
+    monkeypatch.setattr(own_terms.sys.modules["__main__"], "__file__", "<stdin>")
+    with pytest.raises(RewardError, match="its term Turning stands in the program that was started"):
+        request.check(workers=2)
+    monkeypatch.setattr(own_terms.sys.modules["__main__"], "__file__", __file__)
     with pytest.raises(RewardError, match="its term Turning stands in the program that was started"):
         request.check(workers=2, ray="local")
     monkeypatch.setattr(training, "train_by_workers", lambda *_, **__: pytest.fail("asked for workers"))

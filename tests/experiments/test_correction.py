@@ -34,6 +34,10 @@ def test_p_of_ten_and_ten_runs_is_exact() -> None:
     assert permutation_p(ten, ten + 20, ONE) == 2 / 184_756
 
 
+def test_p_of_one_run_beside_two_hundred_is_exact() -> None:
+    assert permutation_p(column(-1), column(*range(200)), ONE) == pytest.approx(1 / 201, rel=1.1)
+
+
 def test_p_of_many_runs_is_drawn() -> None:
     rng = np.random.default_rng(1)
     many = rng.normal(size=(12, 1))

@@ -1,5 +1,7 @@
 """Rewards of whoever asks, each against the first of them."""
 
+import json
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -7,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clearway.errors import ArgumentError
+from clearway.errors import ArgumentError, RunError
 from clearway.evaluation.metrics import METRIC_NAMES
-from clearway.experiments import rewards
+from clearway.experiments import reproduce, rewards
 from clearway.experiments.correction import corrected
 from clearway.experiments.groups import Group, Scores
 from clearway.experiments.job import episodes_of
-from clearway.experiments.reproduce import ReproduceRequest, planned
+from clearway.experiments.reproduce import REQUEST_FILE, ReproduceRequest, planned
 from clearway.experiments.section import Claim
-from clearway.experiments.setting import Setting, prepare
+from clearway.experiments.setting import Setting, named_rewards, prepare
 from clearway.reward import BUMP, CLEARANCE, SHORTEST, RewardError
 from helpers.own_terms import imported
 from helpers.report_tables import by_heading
@@ -120,3 +122,43 @@ def test_rewards_of_one_s_own_are_asked_for_by_name(setting: Setting, tmp_path: 
 def test_a_request_that_compares_nothing_is_refused(names, asked, said, tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match=said):
         ReproduceRequest(names, tmp_path, "smoke", rewards=asked)
+
+
+@pytest.mark.parametrize("name", ["cost 1/2", "../out", "two\nlines", "a" * 300])
+def test_a_name_that_is_no_folder_s_is_refused(name: str, monkeypatch) -> None:
+    odd = replace(SHORTEST, name=name)
+    monkeypatch.setattr("clearway.experiments.setting.reward_named", lambda asked: odd if asked == "odd" else BUMP)
+    with pytest.raises(RewardError, match="its name is part of folders' names"):
+        named_rewards(["bump", "odd"])
+
+
+def asked(out: Path, *names: str, rewards: tuple[str, ...] = ()) -> ReproduceRequest:
+    return ReproduceRequest(names, out, "smoke", rewards=rewards)
+
+
+def test_other_experiments_do_not_depend_on_the_rewards_asked_for(tmp_path: Path) -> None:
+    kept = tmp_path / REQUEST_FILE
+    kept.write_text(json.dumps(reproduce._request_json(asked(tmp_path, "rewards", rewards=("bump", "shortest")))))
+    both = reproduce._with_earlier(asked(tmp_path, "table3"))
+    assert list(both.names) == ["table3", "rewards"] and list(both.rewards) == ["bump", "shortest"]
+    same = reproduce._with_earlier(asked(tmp_path, "fig3", "rewards", rewards=("bump", "shortest")))
+    assert list(same.names) == ["fig3", "rewards"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        reproduce._warn_of_another(asked(tmp_path, "table3"))
+    other = asked(tmp_path, "rewards", rewards=("shortest", "bump"))
+    assert reproduce._with_earlier(other) == other
+    with pytest.warns(UserWarning, match="held a reproduction of rewards, seeds 0 to 1; this one takes its place"):
+        reproduce._warn_of_another(other)
+    kept.write_text(json.dumps(reproduce._request_json(asked(tmp_path, "rewards"))))
+    shipped = asked(tmp_path, "rewards", rewards=("shortest", "collision-aware", "bump", "clearance"))
+    assert reproduce._earlier(shipped)[1]
+
+
+def test_a_report_tells_where_a_reward_cannot_be_imported(setting: Setting, tmp_path: Path) -> None:
+    lost = asked(tmp_path, "rewards", rewards=("shortest", "nowhere:mine"))
+    with pytest.raises(RunError, match=r"json: reward=nowhere:mine: .*Run the command in the folder where"):
+        reproduce._gathered(lost, setting)
+    with pytest.warns(UserWarning, match="nowhere:mine.*The report leaves the experiment rewards out"):
+        found = reproduce._gathered(replace(lost, names=("zone-time", "rewards")), setting)
+    assert [section.name for section in found.sections] == ["zone-time"]

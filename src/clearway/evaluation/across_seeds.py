@@ -121,8 +121,8 @@ def permutation_p(first: np.ndarray, second: np.ndarray, target_scene: np.ndarra
 
 @cache
 def _divisions(runs: int, count: int) -> np.ndarray:
-    """(D, count) int8: the runs of the first kind in each way to divide them, as they are first."""
-    return np.array(list(combinations(range(runs), count)), np.int8)
+    """(D, count) int16: the runs of the first kind in each way to divide them, as they are first."""
+    return np.array(list(combinations(range(runs), count)), np.int16)
 
 
 def _welch(runs: np.ndarray, one: np.ndarray) -> np.ndarray:

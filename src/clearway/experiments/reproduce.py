@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from clearway.errors import PluginError, RunError
+from clearway.errors import ClearwayError, PluginError, RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS, experiment, in_order
@@ -18,8 +18,9 @@ from clearway.experiments.job import is_done, unfinished
 from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.request import ReproduceRequest
+from clearway.experiments.rewards import SHIPPED
 from clearway.experiments.section import Section
-from clearway.experiments.setting import Setting, changed_learners, prepare
+from clearway.experiments.setting import Setting, changed_learners, named_rewards, prepare
 from clearway.files import locked, read_json, written_whole
 from clearway.plugins import find_plugin
 from clearway.torch_threads import torch_threads
@@ -48,7 +49,7 @@ REQUEST_FILE = "reproduction.json"
 HOW_NOT_WHAT = ("out", "workers", "threads", "ray")  # parts of a request that a report does not depend on
 LEARNS_NOTHING = "a smoke run's trainings end before anything is learnt"
 SMOKE_RUN = "Not judged: a smoke run."
-WHO_ASKED = ("names", "commands", "packages")  # parts that may differ between requests of one report
+WHO_ASKED = ("names", "commands", "packages", "rewards")  # parts that may differ between requests of one report
 
 
 def reproduce(
@@ -114,7 +115,7 @@ def gather(out: Path | str) -> Reproduction:
         ClearwayError: the folder holds no reproduction, or its scenes cannot be read.
     """
     request = _read_request(Path(out))
-    return _gathered(request, _setting(request, build=False))
+    return _gathered(request, _setting(replace(request, rewards=()), build=False))
 
 
 def _read_request(out: Path) -> ReproduceRequest:
@@ -137,7 +138,13 @@ def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
     packages = {**earlier.packages, **request.packages}
-    return replace(request, names=in_order(names), commands=tuple(commands), packages=packages)
+    rewards = request.rewards if "rewards" in request.names else earlier.rewards
+    return replace(request, names=in_order(names), rewards=rewards, commands=tuple(commands), packages=packages)
+
+
+def _compared(request: ReproduceRequest) -> list[str]:
+    """Names of the rewards that the experiment `rewards` compares."""
+    return list(request.rewards) or [reward.name for reward in SHIPPED]
 
 
 def _packages(names: Sequence[str]) -> dict[str, str]:
@@ -158,7 +165,10 @@ def _earlier(request: ReproduceRequest) -> tuple[ReproduceRequest | None, bool]:
     """The folder's last request, None where there is none that could be gone on with; and whether it asks the same."""
     try:
         earlier = _read_request(request.out)
-        return earlier, _question(request) == _question(earlier)
+        same = _question(request) == _question(earlier)
+        if same and "rewards" in request.names and "rewards" in earlier.names:
+            same = _compared(request) == _compared(earlier)
+        return earlier, same
     except RunError:
         return None, False
 
@@ -191,8 +201,17 @@ def _question(request: ReproduceRequest) -> str:
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
     jobs, sections = list[Job](), list[Section]()
+    known = _known(request)
+    try:
+        setting = replace(setting, rewards=named_rewards(request.rewards))
+    except ClearwayError as fault:
+        told = f"{request.out / REQUEST_FILE}: {fault}. Run the command in the folder where a module of your own lies"
+        if known == ["rewards"]:
+            raise RunError(told) from fault
+        warnings.warn(f"{told}. The report leaves the experiment rewards out", stacklevel=3)
+        known.remove("rewards")
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
-        for found in map(experiment, _known(request)):
+        for found in map(experiment, known):
             own = found.jobs(setting)
             missing = unfinished(setting.out, own)  # before it is read: a run that ends meanwhile may be left out of it
             section = found.section(setting)

@@ -31,8 +31,9 @@ def section(setting: Setting) -> Section:
         name=NAME,
         title="Rewards",
         text=(
-            f"Agents of {len(others) + 1} rewards, trained and tried alike. Each is judged against the first, {first}. "
-            "Of five seeds a reward at most six claims of a learner can be decided: two rewards beside the first."
+            f"Agents of {len(others) + 1} rewards, trained and tried alike. Each is judged against the first, {first}, "
+            f"by three claims; all {3 * len(others)} of a learner are corrected together. Five seeds a reward decide "
+            "none where they are more than six."
         ),
         tables=(*tables, settling_table(NAME, setting, groups)),
         claims=further(_claims(setting, groups)),

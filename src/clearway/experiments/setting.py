@@ -18,6 +18,7 @@ from clearway.perception import encode_scenes
 from clearway.reward import Reward, RewardError, reward_named
 from clearway.rooms.library import cached_room_scene
 from clearway.scenes.digest import scene_digest
+from clearway.scenes.parts import is_name
 from clearway.scenes.scene import Scene, encoder_names
 from clearway.scenes.targets import default_targets, is_published
 from clearway.scenes.thor_v1 import read_scene, write_scene
@@ -130,9 +131,9 @@ def prepare(
     Raises:
         SceneError: a dump cannot be read or has no features; or a room is not there, and none is to be built.
         RunError: as of `changed_learners`.
-        RewardError: as of `reward_named`; or two rewards are called alike.
+        ClearwayError: as of `named_rewards`.
     """
-    compared = _rewards(rewards)
+    compared = named_rewards(rewards)
     own = changed_learners(learners, budget, changes)
     paths = list(dumps)[: budget.most_scenes] if dumps else _room_files(out, budget, encoder, build, show_progress)
     scenes = tuple(read_scene(path) for path in paths)
@@ -154,8 +155,17 @@ def prepare(
     )
 
 
-def _rewards(names: Sequence[str]) -> tuple[Reward, ...]:
+def named_rewards(names: Sequence[str]) -> tuple[Reward, ...]:
+    """Rewards that are compared by their names.
+
+    Raises:
+        ClearwayError: there is no such reward, it cannot be imported, or two are called alike.
+        RewardError: a reward's own name can be no part of the name of its runs' folders.
+    """
     found = {reward.name: reward for reward in map(reward_named, names)}
+    if odd := [name for name in found if not is_name(name)]:
+        problem = f"reward {odd[0]!r:.80}: its name is part of folders' names"
+        raise RewardError(f"{problem}. Give a short one without slashes and line breaks")
     if len(found) < len(names):
         raise RewardError(f"rewards {', '.join(names)}: two are called alike, of {', '.join(found)}. Rename one")
     return tuple(found.values())

@@ -103,7 +103,8 @@ class RunRequest:
         _ = self.paid
         if workers == 1:
             return
-        main_too = ray is None and hasattr(sys.modules["__main__"], "__file__")  # workers here run a program's file
+        program = getattr(sys.modules["__main__"], "__file__", None)
+        main_too = ray is None and program is not None and Path(program).is_file()  # which workers here run
         self.reward.check_sent(main_too)
         states = [scene.state_count for scene in self.scenes]
         check_scenes(len(states), workers)
