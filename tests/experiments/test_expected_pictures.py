@@ -14,22 +14,9 @@ from clearway.experiments.job import trial_path
 from clearway.experiments.plan import Job, PerturbedPictures
 from clearway.experiments.setting import Setting
 from clearway.live.conditions import Perturbations
-from clearway.live.live_room import LiveRoom
 from clearway.reward import COLLISION_AWARE, SHORTEST
-from helpers.live_setting import live_setting
-from helpers.small_live import walkable_live
 
 SEEN = PerturbedPictures(Perturbations(camera_pitch_jitter=3.0), 3)
-
-
-@pytest.fixture(scope="module")
-def live() -> LiveRoom:
-    return walkable_live()
-
-
-@pytest.fixture
-def in_room(tmp_path: Path, live: LiveRoom, monkeypatch: pytest.MonkeyPatch) -> Setting:
-    return live_setting(tmp_path, live, monkeypatch, seeds=2)
 
 
 def pictures_of(out: Path, jobs: list[Job]) -> int:

@@ -17,10 +17,7 @@ from clearway.experiments.plan import RANDOM_WALK, Job, LiveTrial
 from clearway.experiments.reproduce import planned
 from clearway.experiments.setting import Setting
 from clearway.live.conditions import Condition, Perturbations
-from clearway.live.live_room import LiveRoom
 from clearway.reward import COLLISION_AWARE
-from helpers.live_setting import live_setting
-from helpers.small_live import walkable_live
 from helpers.small_setting import small_setting
 
 SETTINGS = (Condition("none", Perturbations()), Condition("turn", Perturbations(angle_noise=5.0)))
@@ -57,16 +54,6 @@ def test_shortest_steps_are_means_over_all_starts_target_by_target(tmp_path: Pat
     ]
     expected = [sum(steps for steps in way.tolist() if steps > 0) / (way > 0).sum() for way in ways]
     assert shortest_steps(setting.files, setting.targets) == pytest.approx(expected)
-
-
-@pytest.fixture(scope="module")
-def live() -> LiveRoom:
-    return walkable_live()
-
-
-@pytest.fixture
-def in_room(tmp_path: Path, live: LiveRoom, monkeypatch: pytest.MonkeyPatch) -> Setting:
-    return live_setting(tmp_path, live, monkeypatch, seeds=2)
 
 
 def test_walks_off_the_grid_are_tried_in_the_room_by_who_needs_pictures_and_who_does_not(

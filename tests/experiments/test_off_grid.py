@@ -35,7 +35,6 @@ from clearway.scenes.scene import EncoderRecord
 from clearway.zones import Zone, scene_zones
 from helpers.live_setting import live_setting
 from helpers.report_tables import by_heading
-from helpers.small_live import walkable_live
 from helpers.small_setting import small_setting
 
 SETTINGS = (Condition("none", Perturbations()), Condition("turn ± 5°", Perturbations(angle_noise=5.0)))
@@ -46,11 +45,6 @@ IN_ROOM = {
     "within 10 cm": "share_within_10cm",
     "within 30 cm": "share_within_30cm",
 }
-
-
-@pytest.fixture(scope="module")
-def live() -> LiveRoom:
-    return walkable_live()
 
 
 @pytest.fixture

@@ -31,17 +31,11 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.views.seen import made_in_training, seed_in_training, takes_seen
 from clearway.world.world import make_world
 from helpers.report_tables import by_heading
-from helpers.small_live import walkable_live
 from helpers.small_runs import small_learner
 from helpers.small_setting import BUDGET, FRAMES, small_setting
 
 DARK = PerturbedPictures(Perturbations(light=0.5), takes=2)
 FIRST, SECOND = (5, 40), (7, 12, 30)
-
-
-@pytest.fixture(scope="module")
-def live() -> LiveRoom:
-    return walkable_live()
 
 
 @pytest.fixture
