@@ -201,7 +201,7 @@ def check_beside_the_eyes(trials: Sequence[tuple[dict[str, Any], int, dict[str, 
         ]
         walked.add(sum(steps <= 2 * shortest for steps, shortest in means))
         (line,) = [cells for cells in rows_of(part) if cells[0] == run["reward"]["name"]]
-        assert frames != 10 or f"{line[2].partition(';')[0]} of 20" == lost
+        assert frames != 10 or f"{line[2]} of 20" == lost
     assert walked == {2} and "on a random ResNet-50 two.** (Which two differs by reward: halfway through [20 M" in part
 
 

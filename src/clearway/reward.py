@@ -345,7 +345,7 @@ class Reward:
         return [term for term in self.terms if type(term) not in TERMS.values()]
 
     def to_json(self) -> dict[str, object]:
-        """As JSON values: name, parameters, clipping; terms that are not ours by where their class stands, and `codes`.
+        """As JSON values: name, parameters, clipping; terms that are not ours by where their class is, and their code.
 
         Raises:
             RewardError: a parameter of such a term is no JSON value, nor a number of NumPy's.

@@ -22,7 +22,7 @@ from clearway.perception.encode import encoder_from_record
 from clearway.rooms.camera import eye_view
 from clearway.rooms.render import studio
 from clearway.scenes.actions import Action
-from clearway.views.seen import encoder_of_takes
+from clearway.views.seen import record_for_takes
 from clearway.world.world import World, make_world
 from helpers.agents import after_poses
 from helpers.made import corridor_scene
@@ -134,11 +134,13 @@ def test_an_encoder_of_depth_is_refused_before_a_room_is_built(agent) -> None:
         stages([scene], {"corridor": (0,)}, "pose"),
     ):
         pass
-    with pytest.raises(EncoderError, match="corridor has no features by a known encoder, by which those of live walks"):
+    with pytest.raises(
+        EncoderError, match="corridor has no features by a known encoder, by which pictures of live walks"
+    ):
         encoder_of(replace(scene, encoder=None))
 
 
 def test_perturbed_takes_are_not_encoded_by_what_sees_depth() -> None:
     scene = replace(corridor_scene(5), encoder=depth_grid.find_record())
-    with pytest.raises(EncoderError, match=r"sees depth, and perturbed takes are colour pictures. Leave perturb out$"):
-        encoder_of_takes(scene)
+    with pytest.raises(EncoderError, match=r"sees depth, and perturbed takes are in colour. Leave perturb out$"):
+        record_for_takes(scene)

@@ -6,8 +6,8 @@ for 25 independent ones.
 
 Intervals are expanded percentile intervals of the bootstrap (Hesterberg, The American Statistician 69(4), 2015): a
 percentile interval of few runs is too narrow, so its level is raised as Student's t and n / (n - 1) ask for. Of
-5 runs with normal scores it holds the mean in 92 % of all cases instead of 83 %, the difference of two means in 97 %
-instead of 87 %. Two runs say next to nothing: 51 and 66 %.
+5 runs with normal scores it holds the mean in 91 % of all cases, the difference of two alike means in 96 %; other
+scores `benchmarks/coverage.py` tries.
 
 Axis letters: R runs, one a seed, M targets, C scenes, B resamples.
 """

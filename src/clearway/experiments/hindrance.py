@@ -13,7 +13,7 @@ from clearway.live.live_room import MODEL_SOURCE, check_is_room, check_movable
 from clearway.live.walks import encoder_of
 from clearway.scenes.scene import Scene
 from clearway.views.grid import grid_settings
-from clearway.views.seen import TAKES, encoder_of_takes
+from clearway.views.seen import TAKES, record_for_takes
 
 
 def feasible(out: Path, jobs: Iterable[Job], why: str | None) -> list[Job]:
@@ -34,7 +34,7 @@ def hindrance(scenes: Iterable[Scene], *, pictured: bool = False) -> str | None:
             check_movable(scene.name, REFERENCE, fixed=scene.made_by.source == MODEL_SOURCE)
             if pictured:
                 grid_settings(scene, REFERENCE, TAKES, seed=0).check()
-                encoder_of_takes(scene)
+                record_for_takes(scene)
             encoder_of(scene)
     except ClearwayError as error:
         return str(error)

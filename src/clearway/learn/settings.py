@@ -36,7 +36,7 @@ def with_settings(learner: Kind, words: Sequence[str], called: str | None = None
         name, equals, text = word.partition("=")
         if not equals or name not in types:
             names = f"a name among {called or learner.algorithm}'s settings: {', '.join(types)}"
-            hint = _whose(name) if equals and name not in types else ""
+            hint = _whose(name) if equals else ""
             hint = hint or did_you_mean(name, types)
             raise RunError(f"--set {word}: expected name=value with {names}.{hint} Correct it")
         try:

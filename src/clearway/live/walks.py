@@ -19,7 +19,7 @@ from clearway.live.live_room import LiveRoom, live_room
 from clearway.live.result_tables import markdown_tables
 from clearway.live.results import Figures, LiveReport, LiveResult, grid_figures, summarise
 from clearway.perception.encode import encoder_from_record
-from clearway.perception.encoder import Encoder, colour_encoder
+from clearway.perception.encoder import Encoder, colour_encoder_record
 from clearway.regular_files import read_bytes
 from clearway.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from clearway.rooms.detail import taken_fast
@@ -85,7 +85,7 @@ def stages(
     with ExitStack() as opened:
         found = []
         for scene in scenes:
-            made_by = _encoder(scene)  # before the seconds that the room takes
+            made_by = _encoder_record(scene)  # before the seconds that the room takes
             live = live_room(scene)
             encoder = encoder_from_record(made_by)
             world = make_world([scene], {scene.name: targets[scene.name]}, zone_level)
@@ -108,11 +108,11 @@ def encoder_of(scene: Scene) -> Encoder:
     Raises:
         EncoderError: it is unknown, takes others, or cannot be had again.
     """
-    return encoder_from_record(_encoder(scene))
+    return encoder_from_record(_encoder_record(scene))
 
 
-def _encoder(scene: Scene) -> EncoderRecord:
-    return colour_encoder(scene, "those of live walks", "Evaluate on the grid: clearway evaluate")
+def _encoder_record(scene: Scene) -> EncoderRecord:
+    return colour_encoder_record(scene, "pictures of live walks", "Evaluate on the grid: clearway evaluate")
 
 
 def walk_setting(

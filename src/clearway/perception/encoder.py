@@ -86,7 +86,7 @@ def sensor_of(record: EncoderRecord) -> str:
     return str(record.settings.get(SENSOR, RGB))
 
 
-def colour_encoder(scene: Scene, pictures: str, instead: str) -> EncoderRecord:
+def colour_encoder_record(scene: Scene, pictures: str, instead: str) -> EncoderRecord:
     """What made a scene's features of colour pictures, to encode others.
 
     Args:
@@ -102,7 +102,7 @@ def colour_encoder(scene: Scene, pictures: str, instead: str) -> EncoderRecord:
         problem = f"scene {scene.name} has no features by a known encoder, by which {pictures} could be encoded"
         raise EncoderError(f"{problem}. Encode it: clearway scenes encode FILES --out FOLDER (and train again)")
     if (seen := sensor_of(record)) != RGB:
-        problem = f"scene {scene.name}: its encoder {record.name} sees {seen}, and {pictures} are colour pictures"
+        problem = f"scene {scene.name}: its encoder {record.name} sees {seen}, and {pictures} are in colour"
         raise EncoderError(f"{problem}. {instead}")
     return record
 

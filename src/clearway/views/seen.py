@@ -92,11 +92,11 @@ def _encoding(scenes: Sequence[Scene], encoder: Encoder | None) -> Callable[[np.
 
     if encoder is not None:
         return partial(features_of, encoder=encoder)
-    return partial(kept_features, encoder=encoder_from_record(encoder_of_takes(scenes[0])))
+    return partial(kept_features, encoder=encoder_from_record(record_for_takes(scenes[0])))
 
 
-def encoder_of_takes(scene: Scene) -> EncoderRecord:
+def record_for_takes(scene: Scene) -> EncoderRecord:
     """What encodes perturbed takes of a scene. Raises EncoderError where it is unknown or takes no colour pictures."""
-    from clearway.perception.encoder import colour_encoder
+    from clearway.perception.encoder import colour_encoder_record
 
-    return colour_encoder(scene, "perturbed takes", "Leave perturb out")
+    return colour_encoder_record(scene, "perturbed takes", "Leave perturb out")
