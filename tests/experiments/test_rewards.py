@@ -17,7 +17,7 @@ from clearway.experiments.groups import Group, Scores
 from clearway.experiments.job import episodes_of
 from clearway.experiments.reproduce import REQUEST_FILE, ReproduceRequest, planned
 from clearway.experiments.section import Claim
-from clearway.experiments.setting import Setting, named_rewards, prepare
+from clearway.experiments.setting import DEFAULT_REWARDS, Setting, named_rewards, prepare
 from clearway.reward import BUMP, CLEARANCE, SHORTEST, RewardError
 from helpers.own_terms import imported
 from helpers.report_tables import by_heading
@@ -49,8 +49,9 @@ def test_figures_are_those_of_the_rewards_own_agents(setting: Setting) -> None:
 
 
 def test_shipped_rewards_are_compared_where_none_are_named(setting: Setting) -> None:
-    jobs = planned(replace(setting, seeds=(0,), rewards=()), [rewards.NAME])
-    assert {job.run.reward.name for job in jobs} == {"shortest", "collision-aware", "bump", "clearance"}
+    small = small_setting(setting.out, seeds=1)
+    assert {job.run.reward.name for job in rewards.jobs(small)} == {"shortest", "bump", "collision-aware"}
+    assert tuple(reward.name for reward in small.rewards) == DEFAULT_REWARDS
 
 
 @pytest.fixture
@@ -117,6 +118,7 @@ def test_rewards_of_one_s_own_are_asked_for_by_name(setting: Setting, tmp_path: 
         (["rewards"], ["bump", "shortest", "bump"], "expected two or more, each once"),
         (["rewards"], "bump", "rewards='bump': expected a list"),
         (["rewards"], ["bump", 3], "rewards: holds 3, expected texts"),
+        (["rewards"], [], "expected two or more, each once"),
     ],
 )
 def test_a_request_that_compares_nothing_is_refused(names, asked, said, tmp_path: Path) -> None:
@@ -132,7 +134,7 @@ def test_a_name_that_is_no_folder_s_is_refused(name: str, monkeypatch) -> None:
         named_rewards(["bump", "odd"])
 
 
-def asked(out: Path, *names: str, rewards: tuple[str, ...] = ()) -> ReproduceRequest:
+def asked(out: Path, *names: str, rewards: tuple[str, ...] = DEFAULT_REWARDS) -> ReproduceRequest:
     return ReproduceRequest(names, out, "smoke", rewards=rewards)
 
 
@@ -151,14 +153,18 @@ def test_other_experiments_do_not_depend_on_the_rewards_asked_for(tmp_path: Path
     with pytest.warns(UserWarning, match="held a reproduction of rewards, seeds 0 to 1; this one takes its place"):
         reproduce._warn_of_another(other)
     kept.write_text(json.dumps(reproduce._request_json(asked(tmp_path, "rewards"))))
-    shipped = asked(tmp_path, "rewards", rewards=("shortest", "collision-aware", "bump", "clearance"))
+    shipped = asked(tmp_path, "rewards", rewards=DEFAULT_REWARDS)
     assert reproduce._earlier(shipped)[1]
 
 
 def test_a_report_tells_where_a_reward_cannot_be_imported(setting: Setting, tmp_path: Path) -> None:
     lost = asked(tmp_path, "rewards", rewards=("shortest", "nowhere:mine"))
+    lost = replace(lost, dumps=[scene.path for scene in setting.files], learners=["paper"])
+    kept = tmp_path / REQUEST_FILE
+    kept.write_text(json.dumps(reproduce._request_json(lost)))
     with pytest.raises(RunError, match=r"json: reward=nowhere:mine: .*Run the command in the folder where"):
-        reproduce._gathered(lost, setting)
-    with pytest.warns(UserWarning, match="nowhere:mine.*The report leaves the experiment rewards out"):
-        found = reproduce._gathered(replace(lost, names=("zone-time", "rewards")), setting)
+        reproduce.gather(tmp_path)
+    kept.write_text(json.dumps(reproduce._request_json(replace(lost, names=("zone-time", "rewards")))))
+    with pytest.warns(UserWarning, match=r"nowhere:mine.*The report leaves the experiment rewards out"):
+        found = reproduce.gather(tmp_path)
     assert [section.name for section in found.sections] == ["zone-time"]

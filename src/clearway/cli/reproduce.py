@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from clearway.choices import BudgetName, LearnerName, RoomName
-from clearway.cli.arguments import check_at_least, check_seeds, scene_files
+from clearway.cli.arguments import check_seeds, scene_files
 from clearway.cli.console import print_json, say
 from clearway.errors import ClearwayError
 from clearway.remote.address import addresses_without_secrets
@@ -53,7 +53,7 @@ class Reproduce:
     """paper: the paper's settings, synchronous; paper-a3c: asynchronous, far slower; default: the recipe."""
     rewards: tuple[str, ...] = ()
     """Of the experiment rewards, the first against each other one: names as of clearway train --reward, also your own
-    as package.module:name; by default shortest, collision-aware, bump, clearance."""
+    as package.module:name; by default shortest, bump, collision-aware. With five seeds three at most."""
     set: tuple[str, ...] = ()
     """Single settings of every learner, for example --set lr_start=0.002 (all: docs/learning.md)."""
     workers: int | None = None
@@ -72,17 +72,11 @@ class Reproduce:
         check_mujoco()
         from clearway.experiments.catalogue import EXPERIMENTS, in_order
         from clearway.experiments.reproduce import ReproduceRequest, reproduce
+        from clearway.experiments.setting import DEFAULT_REWARDS
 
-        check_at_least(1, threads=self.threads, seeds=self.seeds, workers=self.workers, frames=self.frames)
         check_seeds(first_seed=self.first_seed)
         if not self.names:
             raise ClearwayError(f"no experiment named. Name some of {', '.join(EXPERIMENTS)}, or all")
-        if self.rooms and self.scenes:
-            raise ClearwayError("--rooms are default rooms, and --scenes stand in their place. Give one of the two")
-        if self.encoder != "auto" and self.scenes:
-            raise ClearwayError("--encoder is for default rooms, and --scenes have their features. Give one of the two")
-        if self.workers is not None and self.ray not in (None, "local"):
-            raise ClearwayError(f"--workers are this machine's, and --ray {self.ray} says how many fit. Leave one out")
         names = in_order({*self.names, *(EXPERIMENTS if "all" in self.names else ())} - {"all"})
         request = ReproduceRequest(
             names=names,
@@ -95,7 +89,7 @@ class Reproduce:
             seeds=self.seeds,
             first_seed=self.first_seed,
             learners=list(dict.fromkeys(self.learners)),
-            rewards=self.rewards,
+            rewards=self.rewards or DEFAULT_REWARDS,
             changes=self.set,
             workers=self.workers,
             threads=self.threads,

@@ -16,8 +16,8 @@ from clearway.experiments.other_learners import other_learners
 from clearway.experiments.paper_numbers import TABLE_2, TABLE_3, PaperRow
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import Claim, Section
-from clearway.experiments.setting import Setting
-from clearway.experiments.table1 import REWARDS, claims
+from clearway.experiments.setting import REWARDS, Setting
+from clearway.experiments.table1 import claims
 from clearway.experiments.verdicts import judged_more, judged_no_more
 from clearway.world.world import World
 

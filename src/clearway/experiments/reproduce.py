@@ -18,9 +18,9 @@ from clearway.experiments.job import is_done, unfinished
 from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.request import ReproduceRequest
-from clearway.experiments.rewards import SHIPPED
+from clearway.experiments.rewards import NAME
 from clearway.experiments.section import Section
-from clearway.experiments.setting import Setting, changed_learners, named_rewards, prepare
+from clearway.experiments.setting import DEFAULT_REWARDS, Setting, changed_learners, named_rewards, prepare
 from clearway.files import locked, read_json, written_whole
 from clearway.plugins import find_plugin
 from clearway.torch_threads import torch_threads
@@ -115,7 +115,7 @@ def gather(out: Path | str) -> Reproduction:
         ClearwayError: the folder holds no reproduction, or its scenes cannot be read.
     """
     request = _read_request(Path(out))
-    return _gathered(request, _setting(replace(request, rewards=()), build=False))
+    return _gathered(request, _setting(replace(request, rewards=DEFAULT_REWARDS), build=False))
 
 
 def _read_request(out: Path) -> ReproduceRequest:
@@ -138,13 +138,8 @@ def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
     packages = {**earlier.packages, **request.packages}
-    rewards = request.rewards if "rewards" in request.names else earlier.rewards
+    rewards = request.rewards if NAME in request.names else earlier.rewards
     return replace(request, names=in_order(names), rewards=rewards, commands=tuple(commands), packages=packages)
-
-
-def _compared(request: ReproduceRequest) -> list[str]:
-    """Names of the rewards that the experiment `rewards` compares."""
-    return list(request.rewards) or [reward.name for reward in SHIPPED]
 
 
 def _packages(names: Sequence[str]) -> dict[str, str]:
@@ -166,8 +161,8 @@ def _earlier(request: ReproduceRequest) -> tuple[ReproduceRequest | None, bool]:
     try:
         earlier = _read_request(request.out)
         same = _question(request) == _question(earlier)
-        if same and "rewards" in request.names and "rewards" in earlier.names:
-            same = _compared(request) == _compared(earlier)
+        if same and NAME in request.names and NAME in earlier.names:
+            same = list(request.rewards) == list(earlier.rewards)
         return earlier, same
     except RunError:
         return None, False
@@ -203,13 +198,14 @@ def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
     jobs, sections = list[Job](), list[Section]()
     known = _known(request)
     try:
-        setting = replace(setting, rewards=named_rewards(request.rewards))
+        if NAME in known:
+            setting = replace(setting, rewards=named_rewards(request.rewards))
     except ClearwayError as fault:
         told = f"{request.out / REQUEST_FILE}: {fault}. Run the command in the folder where a module of your own lies"
-        if known == ["rewards"]:
+        if known == [NAME]:
             raise RunError(told) from fault
-        warnings.warn(f"{told}. The report leaves the experiment rewards out", stacklevel=3)
-        known.remove("rewards")
+        warnings.warn(f"{told}. The report leaves the experiment {NAME} out", stacklevel=3)
+        known.remove(NAME)
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
         for found in map(experiment, known):
             own = found.jobs(setting)

@@ -9,6 +9,8 @@ from typing import get_args
 
 from clearway.choices import BudgetName, LearnerName, RoomName
 from clearway.errors import ArgumentError
+from clearway.experiments.rewards import NAME as REWARDS_EXPERIMENT
+from clearway.experiments.setting import DEFAULT_REWARDS
 from clearway.spelling import did_you_mean
 
 
@@ -27,7 +29,7 @@ class ReproduceRequest:
         seeds: how many; None: as the budget says.
         first_seed: of them; the others follow it.
         learners: names among `setting.LEARNERS`.
-        rewards: names of those that the experiment `rewards` compares, see `reward.reward_named`; none: shipped ones.
+        rewards: names of those that the experiment `rewards` compares, see `reward.reward_named`.
         changes: of settings of every learner, such as "lr_start=0.002".
         workers: jobs side by side; None: as many as cores and memory allow.
         threads: of each job.
@@ -51,7 +53,7 @@ class ReproduceRequest:
     seeds: int | None = None
     first_seed: int = 0
     learners: Sequence[LearnerName] = ("paper", "default")
-    rewards: Sequence[str] = ()
+    rewards: Sequence[str] = DEFAULT_REWARDS
     changes: Sequence[str] = ()
     workers: int | None = None
     threads: int = 1
@@ -72,15 +74,24 @@ class ReproduceRequest:
                 raise ArgumentError(f"{name}: holds {others[0]!r:.40}, expected texts. Correct it")
         if not self.names:
             raise ArgumentError("names: no experiment is named. Name some")
-        if self.rewards and "rewards" not in self.names:
+        if tuple(self.rewards) != DEFAULT_REWARDS and REWARDS_EXPERIMENT not in self.names:
             raise ArgumentError("rewards are those of the experiment rewards. Name it, too, or leave them out")
-        if self.rewards and len({*self.rewards}) < max(2, len(self.rewards)):
+        if len({*self.rewards}) < max(2, len(self.rewards)):
             raise ArgumentError(f"rewards={list(self.rewards)!r:.80}: expected two or more, each once. Correct it")
         for name, least in (("frames", 1), ("seeds", 1), ("first_seed", 0), ("workers", 1), ("threads", 1)):
             _check_number(name, getattr(self, name), least, optional=name not in ("first_seed", "threads"))
         for name, text in (("encoder", self.encoder), ("ray", self.ray or "")):
             if not isinstance(text, str):
                 raise ArgumentError(f"{name}={text!r:.40}: expected a text. Correct it")
+        given = "and scene files (--scenes; dumps in Python)"
+        if self.dumps and self.rooms:
+            told = f"rooms={self.rooms[0]}: default rooms, {given} stand in their place"
+            raise ArgumentError(f"{told}. Give one of the two")
+        if self.dumps and self.encoder != "auto":
+            raise ArgumentError(f"encoder={self.encoder}: for default rooms, {given} have theirs. Give one of the two")
+        if self.workers is not None and self.ray not in (None, "local"):
+            told = f"ray={self.ray}: says how many fit, and --workers (workers in Python) are this machine's"
+            raise ArgumentError(f"{told}. Leave one out")
         if not isinstance(self.packages, dict) or not all(isinstance(t, str) for t in self.packages.values()):
             raise ArgumentError(f"packages={self.packages!r:.40}: expected texts by name. Correct it")
 

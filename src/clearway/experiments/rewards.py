@@ -11,10 +11,8 @@ from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import further, judged_less, judged_no_more, with_failures
-from clearway.reward import BUMP, CLEARANCE, COLLISION_AWARE, SHORTEST
 
 NAME = "rewards"
-SHIPPED = (SHORTEST, COLLISION_AWARE, BUMP, CLEARANCE)
 
 
 def jobs(setting: Setting) -> list[Job]:
@@ -41,7 +39,7 @@ def section(setting: Setting) -> Section:
 
 
 def _groups(setting: Setting) -> list[Group]:
-    return compared(setting, setting.rewards or SHIPPED)
+    return compared(setting, setting.rewards)
 
 
 def _claims(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:

@@ -15,7 +15,7 @@ from clearway.learn.learner import Learner
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.settings import with_settings
 from clearway.perception import encode_scenes
-from clearway.reward import Reward, RewardError, reward_named
+from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST, Reward, RewardError, reward_named
 from clearway.rooms.library import cached_room_scene
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.parts import is_name
@@ -39,6 +39,11 @@ ABOUT_LEARNERS: Mapping[str, str] = {
 }
 
 
+REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE)
+"""Of the main experiment."""
+DEFAULT_REWARDS = tuple(own.name for own in REWARDS)
+
+
 @dataclass(frozen=True)
 class Setting:
     """What all experiments share.
@@ -50,7 +55,7 @@ class Setting:
         budget: see there.
         seeds: of the agents.
         learners: the learners to be compared, by name.
-        rewards: to be compared by the experiment `rewards`; none: shipped ones.
+        rewards: to be compared by the experiment `rewards`.
     """
 
     out: Path
@@ -60,7 +65,7 @@ class Setting:
     budget: Budget
     seeds: tuple[int, ...]
     learners: Mapping[str, Learner]
-    rewards: tuple[Reward, ...] = ()
+    rewards: tuple[Reward, ...] = REWARDS
 
     @property
     def original(self) -> bool:
@@ -108,7 +113,7 @@ def prepare(
     seeds: int | None = None,
     first_seed: int = 0,
     learners: Sequence[LearnerName],
-    rewards: Sequence[str] = (),
+    rewards: Sequence[str] = DEFAULT_REWARDS,
     changes: Sequence[str] = (),
     build: bool = True,
     show_progress: bool = False,

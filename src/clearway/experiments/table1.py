@@ -11,13 +11,12 @@ from clearway.experiments.other_learners import other_learners
 from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
-from clearway.experiments.setting import Setting
+from clearway.experiments.setting import REWARDS, Setting
 from clearway.experiments.trajectories import maps
 from clearway.experiments.verdicts import judged_less, judged_no_more, with_failures
 from clearway.learn.settings import with_settings
-from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST, Reward
+from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST
 
-REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE)
 BASELINES = {SHORTEST.name: "the shortest-path reward", BUMP.name: "a penalty for bumping"}
 """What the collision-aware reward is compared with, by name; the paper compares with the first alone."""
 UNCLIPPED = "unclipped"  # ends the name of a learner that the paper does not have

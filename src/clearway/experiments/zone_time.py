@@ -8,8 +8,7 @@ from clearway.experiments.groups import WALKED, Group, Scores, all_jobs, compare
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
-from clearway.experiments.setting import Setting
-from clearway.experiments.table1 import REWARDS
+from clearway.experiments.setting import REWARDS, Setting
 from clearway.experiments.verdicts import further, judged_less, with_failures
 from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST
 
