@@ -27,7 +27,7 @@ from pathlib import Path, PurePosixPath
 
 from clearway.errors import ClearwayError, reason_of
 from clearway.experiments.job import RUNS, TRIALS
-from clearway.experiments.reproduce import REQUEST_FILE
+from clearway.experiments.request_file import REQUEST_FILE
 from clearway.experiments.setting import SCENES
 from clearway.files import folder_written_whole, read_json, written_whole
 from clearway.scenes.scene_files import SCENE_SUFFIXES

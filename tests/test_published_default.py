@@ -10,7 +10,8 @@ import pytest
 from clearway.experiments import fig6, quality
 from clearway.experiments.convergence import mark_steps, settled_row
 from clearway.experiments.groups import WALKED
-from clearway.experiments.reproduce import REQUEST_FILE, gather
+from clearway.experiments.reproduce import gather
+from clearway.experiments.request_file import REQUEST_FILE
 from clearway.experiments.section import Section
 from clearway.learn.run_folder import RunFolder
 from helpers.published import (

@@ -22,7 +22,8 @@ from clearway.experiments.convergence import (
 from clearway.experiments.correction import LEVEL, holm
 from clearway.experiments.groups import PAIR, compared
 from clearway.experiments.job import run_folder
-from clearway.experiments.reproduce import REQUEST_FILE, gather
+from clearway.experiments.reproduce import gather
+from clearway.experiments.request_file import REQUEST_FILE
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less, judged_no_more

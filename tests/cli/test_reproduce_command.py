@@ -19,7 +19,7 @@ import pytest
 
 from clearway.choices import BudgetName, LearnerName
 from clearway.errors import ClearwayError, SceneError
-from clearway.experiments import reproduce, setting
+from clearway.experiments import reproduce, request_file, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.groups import all_jobs, compared
@@ -378,24 +378,24 @@ def test_what_learns_nothing_is_not_judged(clearway, first, out: Path, small, mo
 def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
     settings = {"out": tmp_path, "budget": "paper", "rooms": ("bathroom",), "learners": ("paper",)}
     first = ReproduceRequest(names=("fig3",), frames=8, commands=("one",), **settings)
-    content = reproduce._request_json(first)
-    (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content))
+    request_file.keep_request(first)
+    content = json.loads((tmp_path / request_file.REQUEST_FILE).read_text())
     second = ReproduceRequest(names=("table1",), frames=8, commands=("two",), workers=2, **settings)
-    joined = reproduce._with_earlier(second)
+    joined = request_file.with_earlier(second)
     assert (list(joined.names), joined.commands) == (["table1", "fig3"], ("one", "two"))
     other = replace(second, frames=9)
-    assert reproduce._with_earlier(other) == other
+    assert request_file.with_earlier(other) == other
     fresh = replace(second, first_seed=5)
-    assert reproduce._with_earlier(fresh) == fresh
+    assert request_file.with_earlier(fresh) == fresh
     spelt = replace(second, seeds=5)  # the budget's own number
-    assert list(reproduce._with_earlier(spelt).names) == ["table1", "fig3"]
-    (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content | {"learners": ["default", "paper"]}))
+    assert list(request_file.with_earlier(spelt).names) == ["table1", "fig3"]
+    (tmp_path / request_file.REQUEST_FILE).write_text(json.dumps(content | {"learners": ["default", "paper"]}))
     turned = replace(second, learners=("paper", "default"))
-    assert list(reproduce._with_earlier(turned).names) == ["table1", "fig3"]
-    (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content | {"changes": ["lr_start=0.002", "envs=5"]}))
-    assert reproduce._with_earlier(second) == second
+    assert list(request_file.with_earlier(turned).names) == ["table1", "fig3"]
+    (tmp_path / request_file.REQUEST_FILE).write_text(json.dumps(content | {"changes": ["lr_start=0.002", "envs=5"]}))
+    assert request_file.with_earlier(second) == second
     respelt = replace(second, changes=("envs=5", "lr_start=2e-3"))
-    assert list(reproduce._with_earlier(respelt).names) == ["table1", "fig3"]
+    assert list(request_file.with_earlier(respelt).names) == ["table1", "fig3"]
 
 
 def test_a_report_that_takes_another_s_place_is_told(
@@ -421,10 +421,10 @@ def test_a_request_that_may_not_warn_leaves_the_one_before(
         names=("fig3",), out=tmp_path / "out", budget="smoke", dumps=sorted(dumps.iterdir()), seeds=1
     )
     reproduce.reproduce(request)
-    before = (tmp_path / "out" / reproduce.REQUEST_FILE).read_bytes()
+    before = (tmp_path / "out" / request_file.REQUEST_FILE).read_bytes()
     with pytest.raises(UserWarning, match="held a reproduction of fig3, seed 0; this one takes its place"):
         reproduce.reproduce(replace(request, seeds=2))
-    assert (tmp_path / "out" / reproduce.REQUEST_FILE).read_bytes() == before
+    assert (tmp_path / "out" / request_file.REQUEST_FILE).read_bytes() == before
 
 
 @pytest.mark.parametrize("stopped", ["run_jobs", "told_time", "_gathered"])
@@ -547,7 +547,7 @@ def test_a_reward_that_no_worker_could_import_is_refused_before_anything_is_trai
         with pytest.raises(RewardError, match=told):
             reproduce.reproduce(replace(request, ray=ray))
     assert not (tmp_path / "out" / "runs").exists()
-    assert not (tmp_path / "out" / reproduce.REQUEST_FILE).exists()
+    assert not (tmp_path / "out" / request_file.REQUEST_FILE).exists()
     monkeypatch.setattr(reproduce, "is_done", lambda out, job: True)
     monkeypatch.setattr(reproduce, "run_jobs", lambda out, jobs, **_: jobs and pytest.fail("asked for workers"))
     assert reproduce.reproduce(request).jobs
@@ -575,19 +575,19 @@ def test_commands_that_begin_together_lose_nothing_of_each_other(
     request = ReproduceRequest(
         names=("fig3",), out=tmp_path / "out", budget="smoke", dumps=sorted(dumps.iterdir()), seeds=1
     )
-    read = reproduce._with_earlier
+    read = request_file.with_earlier
 
     def read_slowly(request: ReproduceRequest) -> ReproduceRequest:
         found = read(request)
         time.sleep(0.3)
         return found
 
-    monkeypatch.setattr(reproduce, "_with_earlier", read_slowly)
+    monkeypatch.setattr(request_file, "with_earlier", read_slowly)
     monkeypatch.setattr(reproduce, "run_jobs", lambda *_, **__: None)
     monkeypatch.setattr(reproduce, "_gathered", lambda request, setting: request.names)
     with ThreadPoolExecutor(2) as both:
         list(both.map(reproduce.reproduce, [request, replace(request, names=("fig5",))]))
-    assert json.loads((tmp_path / "out" / reproduce.REQUEST_FILE).read_text())["names"] == ["fig3", "fig5"]
+    assert json.loads((tmp_path / "out" / request_file.REQUEST_FILE).read_text())["names"] == ["fig3", "fig5"]
 
 
 def test_features_of_rooms_depend_on_what_is_asked_for_not_on_what_is_there(

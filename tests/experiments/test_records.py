@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from clearway.errors import SceneError
-from clearway.experiments.reproduce import REQUEST_FILE, ReproduceRequest, gather, reproduce
+from clearway.experiments.reproduce import ReproduceRequest, gather, reproduce
+from clearway.experiments.request_file import REQUEST_FILE
 from clearway.scenes.thor_v1 import write_scene
 from helpers.small_setting import small_rooms
 

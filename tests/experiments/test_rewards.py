@@ -1,6 +1,5 @@
 """Rewards of whoever asks, each against the first of them."""
 
-import json
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,7 +14,8 @@ from clearway.experiments import reproduce, rewards
 from clearway.experiments.correction import corrected
 from clearway.experiments.groups import Group, Scores
 from clearway.experiments.job import episodes_of
-from clearway.experiments.reproduce import REQUEST_FILE, ReproduceRequest, planned
+from clearway.experiments.reproduce import ReproduceRequest, planned
+from clearway.experiments.request_file import keep_request, with_earlier
 from clearway.experiments.section import Claim
 from clearway.experiments.setting import DEFAULT_REWARDS, Setting, named_rewards, prepare
 from clearway.reward import BUMP, CLEARANCE, SHORTEST, RewardError
@@ -139,32 +139,34 @@ def asked(out: Path, *names: str, rewards: tuple[str, ...] = DEFAULT_REWARDS) ->
 
 
 def test_other_experiments_do_not_depend_on_the_rewards_asked_for(tmp_path: Path) -> None:
-    kept = tmp_path / REQUEST_FILE
-    kept.write_text(json.dumps(reproduce._request_json(asked(tmp_path, "rewards", rewards=("bump", "shortest")))))
-    both = reproduce._with_earlier(asked(tmp_path, "table3"))
+    keep_request(asked(tmp_path, "rewards", rewards=("bump", "shortest")))
+    both = with_earlier(asked(tmp_path, "table3"))
     assert list(both.names) == ["table3", "rewards"] and list(both.rewards) == ["bump", "shortest"]
-    same = reproduce._with_earlier(asked(tmp_path, "fig3", "rewards", rewards=("bump", "shortest")))
+    same = with_earlier(asked(tmp_path, "fig3", "rewards", rewards=("bump", "shortest")))
     assert list(same.names) == ["fig3", "rewards"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        reproduce._warn_of_another(asked(tmp_path, "table3"))
+        keep_request(asked(tmp_path, "table3"))
     other = asked(tmp_path, "rewards", rewards=("shortest", "bump"))
-    assert reproduce._with_earlier(other) == other
-    with pytest.warns(UserWarning, match="held a reproduction of rewards, seeds 0 to 1; this one takes its place"):
-        reproduce._warn_of_another(other)
-    kept.write_text(json.dumps(reproduce._request_json(asked(tmp_path, "rewards"))))
-    shipped = asked(tmp_path, "rewards", rewards=DEFAULT_REWARDS)
-    assert reproduce._earlier(shipped)[1]
+    assert with_earlier(other) == other
+    with pytest.warns(UserWarning, match="held a reproduction of table3, rewards, seeds 0 to 1; this one"):
+        keep_request(other)
+
+
+def test_a_kept_request_for_the_default_rewards_asks_the_same_again(tmp_path: Path) -> None:
+    keep_request(asked(tmp_path, "rewards"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        keep_request(asked(tmp_path, "rewards"))
 
 
 def test_a_report_tells_where_a_reward_cannot_be_imported(setting: Setting, tmp_path: Path) -> None:
     lost = asked(tmp_path, "rewards", rewards=("shortest", "nowhere:mine"))
     lost = replace(lost, dumps=[scene.path for scene in setting.files], learners=["paper"])
-    kept = tmp_path / REQUEST_FILE
-    kept.write_text(json.dumps(reproduce._request_json(lost)))
+    keep_request(lost)
     with pytest.raises(RunError, match=r"json: reward=nowhere:mine: .*Run the command in the folder where"):
         reproduce.gather(tmp_path)
-    kept.write_text(json.dumps(reproduce._request_json(replace(lost, names=("zone-time", "rewards")))))
+    keep_request(replace(lost, names=("zone-time", "rewards")))
     with pytest.warns(UserWarning, match=r"nowhere:mine.*The report leaves the experiment rewards out"):
         found = reproduce.gather(tmp_path)
     assert [section.name for section in found.sections] == ["zone-time"]

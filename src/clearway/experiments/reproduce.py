@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from clearway.errors import ClearwayError, PluginError, RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
-from clearway.experiments.catalogue import EXPERIMENTS, experiment, in_order
+from clearway.experiments.catalogue import EXPERIMENTS, experiment
 from clearway.experiments.correction import corrected, not_judged
 from clearway.experiments.expected_time import told_time
 from clearway.experiments.job import is_done, unfinished
 from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.request import ReproduceRequest
+from clearway.experiments.request_file import REQUEST_FILE, keep_request, read_request, with_earlier
 from clearway.experiments.rewards import NAME
 from clearway.experiments.section import Section
-from clearway.experiments.setting import DEFAULT_REWARDS, Setting, changed_learners, named_rewards, prepare
-from clearway.files import locked, read_json, written_whole
+from clearway.experiments.setting import DEFAULT_REWARDS, Setting, named_rewards, prepare
 from clearway.plugins import find_plugin
 from clearway.torch_threads import torch_threads
 
@@ -45,11 +44,8 @@ class Reproduction:
     sections: list[Section]
 
 
-REQUEST_FILE = "reproduction.json"
-HOW_NOT_WHAT = ("out", "workers", "threads", "ray")  # parts of a request that a report does not depend on
 LEARNS_NOTHING = "a smoke run's trainings end before anything is learnt"
 SMOKE_RUN = "Not judged: a smoke run."
-WHO_ASKED = ("names", "commands", "packages", "rewards")  # parts that may differ between requests of one report
 
 
 def reproduce(
@@ -79,13 +75,10 @@ def reproduce(
     left = [job for job in jobs if not is_done(request.out, job)]
     for job in left:
         job.run.reward.check_sent()
-    kept = request.out / REQUEST_FILE
-    with locked(kept), written_whole(kept) as part:  # none of two that begin together is lost
-        _warn_of_another(request)
-        part.write_text(json.dumps(_request_json(_with_earlier(request)), indent=2) + "\n", encoding="utf-8")
+    keep_request(request)
     try:
         _run_left(request, jobs, left, show_progress, tell)
-        return _gathered(_with_earlier(request), setting)  # others may have been asked for meanwhile
+        return _gathered(with_earlier(request), setting)  # others may have been asked for meanwhile
     except KeyboardInterrupt:
         if tell is not None:
             done = sum(is_done(request.out, job) for job in jobs)
@@ -114,32 +107,8 @@ def gather(out: Path | str) -> Reproduction:
     Raises:
         ClearwayError: the folder holds no reproduction, or its scenes cannot be read.
     """
-    request = _read_request(Path(out))
+    request = read_request(Path(out))
     return _gathered(request, _setting(replace(request, rewards=DEFAULT_REWARDS), build=False))
-
-
-def _read_request(out: Path) -> ReproduceRequest:
-    path = out / REQUEST_FILE
-    try:
-        content = read_json(path)
-        dumps = [out / dump for dump in content.pop("dumps")]  # a record's lie in the folder
-        return ReproduceRequest(out=out, dumps=dumps, **content)
-    except (FileNotFoundError, NotADirectoryError) as error:
-        raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise RunError(f"{path}: not readable ({error}). Run clearway reproduce on the folder again") from error
-
-
-def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
-    """The request, and the experiments that the folder's last one asked for where all else is alike."""
-    earlier, same = _earlier(request)
-    if earlier is None or not same:
-        return request
-    names = {*earlier.names, *request.names}
-    commands = dict.fromkeys((*earlier.commands, *request.commands))
-    packages = {**earlier.packages, **request.packages}
-    rewards = request.rewards if NAME in request.names else earlier.rewards
-    return replace(request, names=in_order(names), rewards=rewards, commands=tuple(commands), packages=packages)
 
 
 def _packages(names: Sequence[str]) -> dict[str, str]:
@@ -154,44 +123,6 @@ def _packages(names: Sequence[str]) -> dict[str, str]:
         if name not in EXPERIMENTS and (plugin := find_plugin("experiments", name)):
             found[name] = f"{plugin.package} {plugin.version}"
     return found
-
-
-def _earlier(request: ReproduceRequest) -> tuple[ReproduceRequest | None, bool]:
-    """The folder's last request, None where there is none that could be gone on with; and whether it asks the same."""
-    try:
-        earlier = _read_request(request.out)
-        same = _question(request) == _question(earlier)
-        if same and NAME in request.names and NAME in earlier.names:
-            same = list(request.rewards) == list(earlier.rewards)
-        return earlier, same
-    except RunError:
-        return None, False
-
-
-def _warn_of_another(request: ReproduceRequest) -> None:
-    """Warn where the folder's last request asks something else, so that its report is replaced."""
-    earlier, same = _earlier(request)
-    if earlier is None or same:
-        return
-    first, count = earlier.first_seed, earlier.seeds or BUDGETS[earlier.budget].seeds
-    seeds = f"seed {first}" if count == 1 else f"seeds {first} to {first + count - 1}"
-    told = f"{request.out} held a reproduction of {', '.join(earlier.names)}, {seeds}; this one takes its place"
-    warnings.warn(f"{told} in the report. Its runs stay; use another --out to keep both", stacklevel=3)
-
-
-def _question(request: ReproduceRequest) -> str:
-    """All of a request that must agree for its experiments to stand in one report, defaults filled in."""
-    budget = BUDGETS[request.budget].changed(request.rooms, request.frames)
-    learners = changed_learners(request.learners, budget, request.changes)
-    content = _request_json(request) | {
-        "budget": asdict(budget),
-        "rooms": None,
-        "frames": None,
-        "seeds": request.seeds or budget.seeds,
-        "learners": {name: asdict(learner) for name, learner in learners.items()},
-        "changes": None,
-    }
-    return json.dumps({name: value for name, value in content.items() if name not in WHO_ASKED}, sort_keys=True)
 
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
@@ -275,11 +206,6 @@ def _setting(request: ReproduceRequest, *, build: bool = True, show_progress: bo
         build=build,
         show_progress=show_progress,
     )
-
-
-def _request_json(request: ReproduceRequest) -> dict[str, object]:
-    content = {name: value for name, value in asdict(request).items() if name not in HOW_NOT_WHAT}
-    return {**content, "dumps": [str(dump.resolve()) for dump in request.dumps]}
 
 
 def planned(setting: Setting, names: Sequence[str]) -> list[Job]:
