@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,49 @@ def test_the_first_child_gets_no_interrupt_either(tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text(PROGRAM)
     said = subprocess.run([sys.executable, tmp_path / "program.py"], capture_output=True, text=True, check=True)
     assert said.stdout == "[2] 0\n"  # SIGINT is held in the child, nothing in the parent any more
+
+
+IMPORTED_AGAIN = """
+from clearway.children import check_program
+{guard}
+    check_program()
+    print("checked", __name__, flush=True)
+"""
+GUARD = 'if __name__ == "__main__":'
+
+
+def checked(words: list[str], folder: Path, program: str = "") -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, *words], input=program, capture_output=True, text=True, cwd=folder)
+
+
+@pytest.mark.parametrize(
+    "words", [["program.py"], ["-m", "program"], ["program.zip"], ["-c", IMPORTED_AGAIN.format(guard="if True:")]]
+)
+def test_a_program_that_children_can_import_or_need_not_passes(words: list[str], tmp_path: Path) -> None:
+    (tmp_path / "program.py").write_text(IMPORTED_AGAIN.format(guard=GUARD))
+    with zipfile.ZipFile(tmp_path / "program.zip", "w") as archive:
+        archive.write(tmp_path / "program.py", "__main__.py")
+    said = checked(words, tmp_path)
+    assert (said.returncode, said.stdout, said.stderr) == (0, "checked __main__\n", "")
+
+
+@pytest.mark.parametrize("words", [["program.py"], ["-m", "program"]])
+def test_a_program_that_runs_all_when_it_is_imported_is_refused(words: list[str], tmp_path: Path) -> None:
+    (tmp_path / "program.py").write_text(IMPORTED_AGAIN.format(guard="if True:"))
+    said = checked(words, tmp_path)
+    assert said.returncode == 1 and not said.stdout
+    assert "has finished its bootstrapping phase" in said.stderr  # Python's own words
+    (told,) = [
+        line for line in said.stderr.splitlines() if "RunError" in line and "program.py: a worker process" in line
+    ]
+    assert told.endswith(f"ended with 1 (see above). Keep it in a file, what it runs below `{GUARD}`")
+
+
+def test_a_program_from_standard_input_is_refused(tmp_path: Path) -> None:
+    said = checked(["-"], tmp_path, IMPORTED_AGAIN.format(guard=GUARD))
+    assert said.returncode == 1 and not said.stdout
+    told = said.stderr.splitlines()[-1]
+    assert told.startswith("clearway.errors.RunError: <stdin>: no file, and worker processes import the program")
 
 
 PARENT = """

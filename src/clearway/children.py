@@ -21,9 +21,12 @@ from contextlib import contextmanager
 from multiprocessing import active_children, resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
 
+from clearway.errors import RunError
+
 ORPHANED = 1  # exit code; nobody is left to see it
 LOOKS_EVERY_S = 1.0
 PR_SET_PDEATHSIG = 1  # of Linux's prctl
+CHILD_S_MAIN = "__mp_main__"  # as a child imports the program; it may start none meanwhile, as Python sees to
 
 
 def end_with_parent(parent: int) -> None:
@@ -99,6 +102,29 @@ def collector_rests() -> Iterator[None]:
     finally:
         if not rested:
             gc.enable()
+
+
+def check_program() -> None:
+    """Refuse a program that a child of `multiprocessing` cannot import, as all of them do when they begin.
+
+    One child tries; what went wrong is printed there, as Python does.
+
+    Raises:
+        RunError: it cannot.
+    """
+    program = sys.modules["__main__"]
+    path = getattr(program, "__file__", None)
+    if path is None and CHILD_S_MAIN not in sys.modules:  # a notebook's, say, which no child looks for
+        return
+    remedy = 'Keep it in a file, what it runs below `if __name__ == "__main__":`'
+    if path is not None and program.__spec__ is None and not os.path.isfile(path):
+        raise RunError(f"{path}: no file, and worker processes import the program that starts them. {remedy}")
+    child = ChildProcess(target=gc.enable)
+    child.start()
+    child.join()
+    if child.exitcode != 0:
+        problem = f"a worker process that imports this program, as all do, ended with {child.exitcode} (see above)"
+        raise RunError(f"{path}: {problem}. {remedy}")
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 import torch
@@ -160,6 +161,15 @@ def test_workers_without_a_gpu_for_each_are_refused(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
     with pytest.raises(RunError, match=r"2 workers on 1 GPU: each needs one of its own\. Give fewer"):
         train_by_workers(small_request(device="cuda"), tmp_path / "run", 2)
+    assert not (tmp_path / "run").exists()
+
+
+def test_workers_of_a_program_that_is_no_file_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stdin = ModuleType("__main__")
+    stdin.__file__ = "<stdin>"
+    monkeypatch.setitem(sys.modules, "__main__", stdin)
+    with pytest.raises(RunError, match="<stdin>: no file, and worker processes import the program"):
+        train_by_workers(small_request(), tmp_path / "run", 2)
     assert not (tmp_path / "run").exists()
 
 

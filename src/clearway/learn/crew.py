@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import torch
 
-from clearway.children import all_children_end, end_with_parent
+from clearway.children import all_children_end, check_program, end_with_parent
 from clearway.errors import ClearwayError, RunError
 from clearway.learn.peers import LostPeer, Peers
 from clearway.spread.messages import Sent
@@ -92,11 +92,12 @@ class Place:
     restarts: int
 
 
-def check_gpus(device: str, workers: int) -> None:
-    """Raises RunError where this machine has no GPU for each."""
+def check_here(device: str, workers: int) -> None:
+    """Raises RunError where this machine has no GPU for each, or workers cannot import the program, as they do."""
     if torch.device(device).type == "cuda" and workers > (count := torch.cuda.device_count()):
         problem = f"{workers} workers on {count} GPU{'s' * (count != 1)}: each needs one of its own"
         raise RunError(f"{problem}. Give fewer --workers, or --device cpu")
+    check_program()
 
 
 def launched_by(task: Task, workers: int, ray: str | None) -> list[str | None]:

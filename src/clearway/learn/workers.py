@@ -17,7 +17,7 @@ import torch
 
 from clearway.choices import TrackerName
 from clearway.errors import RunError
-from clearway.learn.crew import Task, check_gpus, ended_well, launched_by
+from clearway.learn.crew import Task, check_here, ended_well, launched_by
 from clearway.learn.peers import Peers
 from clearway.learn.progress import progress_view
 from clearway.learn.run_folder import RunFolder
@@ -107,7 +107,7 @@ def train_by_workers(
     check_tracker(track)
     request.check(workers, ray)
     if ray is None:
-        check_gpus(request.device, workers)
+        check_here(request.device, workers)
     folder = RunFolder(out)
     opened_copy(copy_to, folder, resume)
     own_files = features_read_once(request) if ray is None else nullcontext(request)  # which other machines do not see

@@ -12,7 +12,7 @@ import torch
 
 from clearway.choices import TrackerName
 from clearway.errors import RunError
-from clearway.learn.crew import Task, check_gpus, ended_well, launched_by
+from clearway.learn.crew import Task, check_here, ended_well, launched_by
 from clearway.learn.peers import Peers
 from clearway.learn.tracking import check_tracker
 from clearway.pretraining.eyes_folder import EyesFolder, record_of
@@ -84,7 +84,7 @@ def pretrain_by_workers(
     usable_device(request.device)
     check_groups(request.settings, workers)
     if ray is None:
-        check_gpus(request.device, workers)
+        check_here(request.device, workers)
     folder, record = EyesFolder(out), record_of(request)
     record["hardware"]["workers"] = workers
     with folder.held(), folder.begun(record, resume):
