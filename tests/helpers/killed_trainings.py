@@ -1,9 +1,9 @@
 """Trainings of every algorithm, tiny, that are killed at random moments after their first checkpoint and go on.
 
-Each attempt is a fork of this process. It writes a checkpoint after every update; once it has written a new one, it
-gets SIGKILL up to `LONGEST_DELAY_S` later. A training that came to its end before all kills fell is compared, and begun
-anew for those left. `python -m helpers.killed_trainings FOLDER NAME KILLS SEED` prints the kills that fell, and whether
-all bits are those of a training that nobody has killed.
+Each attempt is a fork of this process. It writes a checkpoint after every update; once it has written a new one, the
+first attempt sooner, it gets SIGKILL up to `LONGEST_DELAY_S` later. A training that came to its end before all kills
+fell is compared, and begun anew for those left. `python -m helpers.killed_trainings FOLDER NAME KILLS SEED` prints the
+kills that fell, and whether all bits are those of a training that nobody has killed.
 """
 
 from __future__ import annotations
@@ -104,10 +104,10 @@ def newest(out: Path) -> str:
     return max((path.name for path in (out / "checkpoints").glob("frames-*")), default="")
 
 
-def killed(process: int, out: Path, delay_s: float) -> bool:
-    """Kill a training some time after its next checkpoint; whether it was still there."""
+def killed(process: int, out: Path, delay_s: float, *, waits: bool) -> bool:
+    """Kill a training some time after it began, or `waits` for its next checkpoint; whether it was still there."""
     before, deadline = newest(out), time.monotonic() + PATIENCE_S
-    while newest(out) == before:
+    while waits and newest(out) == before:
         ended, status = os.waitpid(process, os.WNOHANG)
         if ended:
             assert status == 0, "a training failed"
@@ -127,6 +127,11 @@ def bits_of(out: Path) -> dict[str, Tensor]:
     return {**read_network(end), **read_training(end)}
 
 
+def files_of(folder: Path) -> set[str]:
+    """What lies in a run folder."""
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
 def figures_of(name: str, out: Path) -> list[dict[str, float]]:
     """The figures on the way, without times; of A3C the episodes alone, since its rows fall where workers pause."""
     rows = RunFolder(out).metrics()
@@ -138,18 +143,20 @@ def figures_of(name: str, out: Path) -> list[dict[str, float]]:
 def kill_to_the_end(training: Callable[[Path], object], out: Path, kills: int, chance: random.Random) -> int:
     """Kill a training up to so many times and let it come to its end; the number of kills that fell before it did."""
     fell = 0
-    while fell < kills and killed(begun(training, out), out, chance.uniform(0, LONGEST_DELAY_S)):
+    while fell < kills and killed(begun(training, out), out, chance.uniform(0, LONGEST_DELAY_S), waits=out.exists()):
         fell += 1
     assert os.waitpid(begun(training, out), 0)[1] == 0
     return fell
 
 
 def compare(name: str, whole: Path, out: Path) -> None:
-    """The training that was killed ended as the whole one did.
+    """The training that was killed ended as the whole one did, and left nothing else behind.
 
     Raises:
-        AssertionError: a bit or a figure differs.
+        AssertionError: a bit or a figure differs, or there is a file more.
     """
+    more = {path for path in files_of(out) - files_of(whole) if not path.startswith("checkpoints/frames-")}
+    assert not more, f"{name}: {more} left behind"
     bits, others = bits_of(whole), bits_of(out)
     assert bits.keys() == others.keys(), f"{name}: other tensors"
     different = [key for key in bits if not torch.equal(bits[key], others[key])]
