@@ -120,7 +120,10 @@ def check_program() -> None:
     if path is not None and program.__spec__ is None and not os.path.isfile(path):
         raise RunError(f"{path}: no file, and worker processes import the program that starts them. {remedy}")
     child = ChildProcess(target=gc.enable)
-    child.start()
+    try:
+        child.start()
+    except OSError:  # no room for a process: those who start more tell of it
+        return
     child.join()
     if child.exitcode != 0:
         problem = f"a worker process that imports this program, as all do, ended with {child.exitcode} (see above)"

@@ -147,7 +147,7 @@ def train(
         feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.world.feature_store`.
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
         workers: processes of this machine that train together, a scene each at least; by ppo, a2c and bc. A script that
-            asks for several does it below `if __name__ == "__main__":`. See docs/scale.md.
+            asks for several, or for a3c, does it below `if __name__ == "__main__":`. See docs/scale.md.
         ray: a Ray cluster whose nodes run the workers: "local", "auto" or an address. All see scene files and `out`
             under the same paths.
         until_solved: stop before all frames are used, once the latest 20 training episodes or more of every target

@@ -10,6 +10,7 @@ from contextlib import closing
 from dataclasses import replace
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 import torch
@@ -245,6 +246,15 @@ def test_a_process_that_cannot_be_started_is_told_of(monkeypatch: pytest.MonkeyP
     with closing(async_trainer(1000, processes=2)) as trainer:
         with pytest.raises(RunError, match=r"worker process 1 of 2 cannot be started.*unavailable.*fewer --threads"):
             trainer.update()
+
+
+def test_a_program_that_workers_cannot_import_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stdin = ModuleType("__main__")
+    stdin.__file__ = "<stdin>"
+    monkeypatch.setitem(sys.modules, "__main__", stdin)
+    with pytest.raises(RunError, match="<stdin>: no file, and worker processes import the program"):
+        train.train(a3c_request(400), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_checkpoint_of_before_sights_were_drawn_is_gone_on_from() -> None:

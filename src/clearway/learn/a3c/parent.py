@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection, wait
 import torch
 from torch import Tensor
 
-from clearway.children import ChildProcess, signals_held
+from clearway.children import ChildProcess, check_program, signals_held
 from clearway.errors import RunError
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import WorkerGroup
@@ -102,7 +102,7 @@ class AsyncTrainer:
         """Let the workers use some more frames; returns means over their updates.
 
         Raises:
-            RunError: a process has died, or the loss or a gradient is not finite.
+            RunError: a process has died or cannot begin, or the loss or a gradient is not finite.
         """
         if not self._processes:
             self._start()
@@ -166,6 +166,7 @@ class AsyncTrainer:
 
     def _start(self) -> None:
         """Start the processes where the workers stand."""
+        check_program()
         self.shared["frames"].zero_()
         self.shared["frames"][-1] = self.frames
         context = get_context("spawn")
