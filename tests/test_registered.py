@@ -178,7 +178,7 @@ def test_a_verdict_names_the_commit_that_wrote_its_question(page: str, questions
     assert set(commits.split(", ")) == (last or {"not shown"})
 
 
-LATE, OPEN = {13}, {73}  # registered late; not answered
+LATE = {13}  # registered late
 PLAIN = re.compile(r"(?<!\[)\b[Qq]uestions? (\d+(?:(?:, | and | to )\d+)*)")
 
 
@@ -190,7 +190,7 @@ def test_no_verdict_names_a_question_without_its_commit(page: str) -> None:
     assert not re.findall(r"\[[Qq]uestions? \d[^]()]*\]\(", text)
     named = {number for questions, _ in NAMED.findall(text) for number in numbers_of(questions)}
     plain = {number for questions in PLAIN.findall(text) for number in numbers_of(questions)}
-    assert plain <= named | LATE | OPEN
+    assert plain <= named | LATE
 
 
 def test_a_changed_question_is_another() -> None:
