@@ -31,13 +31,13 @@ def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
     report = gather(tmp_path / "off-grid")
     page = section_of(EVIDENCE, "Five seeds, published settings")
     (section,) = report.sections
+    assert not section.missing
     check_off_the_grid(section, page)
     check_who_had_settled(report.setting, page)
 
 
 def check_off_the_grid(section: Section, page: str) -> None:
     """Means, what each setting comes to, and the claims."""
-    assert not section.missing
     (table,) = section.tables
     rows = by_heading(table)
     lines = page.splitlines()

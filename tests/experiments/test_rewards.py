@@ -15,7 +15,7 @@ from clearway.experiments.correction import corrected
 from clearway.experiments.groups import Group, Scores
 from clearway.experiments.job import episodes_of
 from clearway.experiments.reproduce import ReproduceRequest, planned
-from clearway.experiments.request_file import keep_request, with_earlier
+from clearway.experiments.request_file import REQUEST_FILE, keep_request, with_earlier
 from clearway.experiments.section import Claim
 from clearway.experiments.setting import DEFAULT_REWARDS, Setting, named_rewards, prepare
 from clearway.reward import BUMP, CLEARANCE, SHORTEST, RewardError
@@ -155,9 +155,10 @@ def test_other_experiments_do_not_depend_on_the_rewards_asked_for(tmp_path: Path
 
 def test_a_kept_request_for_the_default_rewards_asks_the_same_again(tmp_path: Path) -> None:
     keep_request(asked(tmp_path, "rewards"))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    kept = (tmp_path / REQUEST_FILE).read_bytes()
+    with warnings.catch_warnings(record=True) as told:
         keep_request(asked(tmp_path, "rewards"))
+    assert not told and (tmp_path / REQUEST_FILE).read_bytes() == kept
 
 
 def test_a_report_tells_where_a_reward_cannot_be_imported(setting: Setting, tmp_path: Path) -> None:

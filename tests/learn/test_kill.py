@@ -13,7 +13,7 @@ KILLS = {"ppo": 50, "a2c": 50}  # of others two
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork, which Windows has not")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_killed_training_goes_on_to_the_same_bits(name: str, tmp_path: Path) -> None:
     kills = KILLS.get(name, 2)

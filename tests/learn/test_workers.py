@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 import torch
@@ -164,10 +163,8 @@ def test_workers_without_a_gpu_for_each_are_refused(tmp_path: Path, monkeypatch:
     assert not (tmp_path / "run").exists()
 
 
-def test_workers_of_a_program_that_is_no_file_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    stdin = ModuleType("__main__")
-    stdin.__file__ = "<stdin>"
-    monkeypatch.setitem(sys.modules, "__main__", stdin)
+@pytest.mark.usefixtures("from_standard_input")
+def test_workers_of_a_program_that_is_no_file_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="<stdin>: no file, and worker processes import the program"):
         train_by_workers(small_request(), tmp_path / "run", 2)
     assert not (tmp_path / "run").exists()

@@ -10,7 +10,6 @@ from contextlib import closing
 from dataclasses import replace
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 import torch
@@ -248,10 +247,8 @@ def test_a_process_that_cannot_be_started_is_told_of(monkeypatch: pytest.MonkeyP
             trainer.update()
 
 
-def test_a_program_that_workers_cannot_import_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    stdin = ModuleType("__main__")
-    stdin.__file__ = "<stdin>"
-    monkeypatch.setitem(sys.modules, "__main__", stdin)
+@pytest.mark.usefixtures("from_standard_input")
+def test_a_program_that_workers_cannot_import_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="<stdin>: no file, and worker processes import the program"):
         train.train(a3c_request(400), tmp_path / "run")
     assert not (tmp_path / "run").exists()
