@@ -73,6 +73,14 @@ def test_a_program_that_runs_all_when_it_is_imported_is_refused(words: list[str]
     assert told.endswith(f"ended with 1 (see above). Keep it in a file, what it runs below `{GUARD}`")
 
 
+def test_a_program_that_ends_when_it_is_imported_is_refused(tmp_path: Path) -> None:
+    ends = IMPORTED_AGAIN.format(guard="if __name__ != '__main__':\n    raise SystemExit(0)\nelse:")
+    (tmp_path / "program.py").write_text(ends)
+    said = checked(["program.py"], tmp_path)
+    assert said.returncode == 1 and "program.py: a worker process that imports this program" in said.stderr
+    assert "ended with 0" in said.stderr
+
+
 def test_a_program_from_standard_input_is_refused(tmp_path: Path) -> None:
     said = checked(["-"], tmp_path, IMPORTED_AGAIN.format(guard=GUARD))
     assert said.returncode == 1 and not said.stdout

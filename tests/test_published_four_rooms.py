@@ -56,9 +56,12 @@ def test_four_rooms_otherwise_are_what_their_record_comes_to(tmp_path: Path) -> 
 
 def setting_of(learner: Mapping[str, Any]) -> str:
     """Which of the three settings of four rooms a run has, as the tables call it."""
-    if learner["whiten_features"]:
-        return "whitened"
-    return "3 x rate" if learner["lr_start"] == 0.0021 else "twice as long"
+    settings = tuple(learner[name] for name in ("lr_start", "centre_features", "whiten_features", "frames"))
+    return {
+        (0.0021, False, False, 10_000_000): "3 x rate",
+        (0.0007, True, True, 10_000_000): "whitened",
+        (0.0007, False, False, 20_000_000): "twice as long",
+    }[settings]
 
 
 def test_three_seeds_in_four_rooms_are_what_their_records_come_to(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from clearway.errors import RunError
 ORPHANED = 1  # exit code; nobody is left to see it
 LOOKS_EVERY_S = 1.0
 PR_SET_PDEATHSIG = 1  # of Linux's prctl
+IMPORTED = 17  # exit code of a child that has imported the program
 CHILD_S_MAIN = "__mp_main__"  # as a child imports the program; it may start none meanwhile, as Python sees to
 
 
@@ -119,13 +120,16 @@ def check_program() -> None:
     remedy = 'Keep it in a file, what it runs below `if __name__ == "__main__":`'
     if path is not None and program.__spec__ is None and not os.path.isfile(path):
         raise RunError(f"{path}: no file, and worker processes import the program that starts them. {remedy}")
-    child = ChildProcess(target=gc.enable)
+    child = ChildProcess(target=sys.exit, args=(IMPORTED,), daemon=True)
     try:
         child.start()
     except OSError:  # no room for a process: those who start more tell of it
         return
-    child.join()
-    if child.exitcode != 0:
+    try:
+        child.join()
+    finally:
+        child.kill()  # where the user interrupted
+    if child.exitcode != IMPORTED:
         problem = f"a worker process that imports this program, as all do, ended with {child.exitcode} (see above)"
         raise RunError(f"{path}: {problem}. {remedy}")
 

@@ -1,5 +1,6 @@
 """Rewards of whoever asks, each against the first of them."""
 
+import json
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
@@ -159,6 +160,13 @@ def test_a_kept_request_for_the_default_rewards_asks_the_same_again(tmp_path: Pa
     with warnings.catch_warnings(record=True) as told:
         keep_request(asked(tmp_path, "rewards"))
     assert not told and (tmp_path / REQUEST_FILE).read_bytes() == kept
+
+
+def test_a_request_that_was_kept_without_rewards_is_gone_on_with(tmp_path: Path) -> None:
+    keep_request(asked(tmp_path, "table3"))
+    path = tmp_path / REQUEST_FILE
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"rewards": []}))
+    assert list(with_earlier(asked(tmp_path, "fig3")).names) == ["fig3", "table3"]
 
 
 def test_a_report_tells_where_a_reward_cannot_be_imported(setting: Setting, tmp_path: Path) -> None:

@@ -1,9 +1,10 @@
 """Trainings of every algorithm, tiny, that are killed at random moments after their first checkpoint and go on.
 
-Each attempt is a fork of this process. It writes a checkpoint after every update; once it has written a new one, the
-first attempt sooner, it gets SIGKILL up to `LONGEST_DELAY_S` later. A training that came to its end before all kills
-fell is compared, and begun anew for those left. `python -m helpers.killed_trainings FOLDER NAME KILLS SEED` prints the
-kills that fell, and whether all bits are those of a training that nobody has killed.
+Each attempt is a fork of this process. It writes a checkpoint after every update; once it has written a new one, it
+gets SIGKILL up to `LONGEST_DELAY_S` later. One more kill, which does not count, falls as a training begins. A training
+that came to its end before all kills fell is compared, and begun anew for those left.
+`python -m helpers.killed_trainings FOLDER NAME KILLS SEED` prints the kills that fell, and whether all bits are those
+of a training that nobody has killed.
 """
 
 from __future__ import annotations
@@ -143,7 +144,8 @@ def figures_of(name: str, out: Path) -> list[dict[str, float]]:
 def kill_to_the_end(training: Callable[[Path], object], out: Path, kills: int, chance: random.Random) -> int:
     """Kill a training up to so many times and let it come to its end; the number of kills that fell before it did."""
     fell = 0
-    while fell < kills and killed(begun(training, out), out, chance.uniform(0, LONGEST_DELAY_S), waits=out.exists()):
+    killed(begun(training, out), out, chance.uniform(0, LONGEST_DELAY_S), waits=False)
+    while fell < kills and killed(begun(training, out), out, chance.uniform(0, LONGEST_DELAY_S), waits=True):
         fell += 1
     assert os.waitpid(begun(training, out), 0)[1] == 0
     return fell

@@ -30,6 +30,8 @@ def read_request(out: Path) -> ReproduceRequest:
     try:
         content = read_json(path)
         dumps = [out / dump for dump in content.pop("dumps")]  # a record's lie in the folder
+        if not content.get("rewards", True):  # kept before the default had names
+            del content["rewards"]
         return ReproduceRequest(out=out, dumps=dumps, **content)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
