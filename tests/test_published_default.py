@@ -116,7 +116,7 @@ def check_quality(section: Section, told: list[list[str]]) -> None:
     for text, name in zip(ranges, ("x the shortest path", "worst target", "collisions"), strict=True):
         for end, value in zip(numbers(text), sorted(row[name] for row in own)[::4], strict=True):
             assert_written(end, value, name)
-    told = "Five trainings of fresh seeds meet them in the rooms it was tuned on, but for time ([question 64"
+    told = "Five trainings, fresh seeds, meet them in the rooms it was tuned on, but for time ([question 64"
     assert told in RESULTS
     assert "64: yes, all five." in REGISTERED
 

@@ -31,7 +31,6 @@ def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
         assert_written("93.3", 93.36, "far")
 
 
-@pytest.mark.slow
 def test_the_page_names_every_record_and_how_many_runs_it_holds() -> None:
     table = rows_of(EVIDENCE.partition("## Records\n")[2].partition("\n## ")[0])[1:]
     told = [

@@ -85,7 +85,19 @@ def test_three_seeds_in_four_rooms_are_what_their_records_come_to(tmp_path: Path
     )
     assert (usual, careful) == ([3, 5], [5])
     assert "none of 18 runs" in RESULTS and "after 20 M `shortest` loses 3 to 5, `collision-aware` 5 (" in RESULTS
-    check_who_is_lost(arrive, section_of(EVIDENCE, "Four rooms, three seeds"))
+    page = section_of(EVIDENCE, "Four rooms, three seeds")
+    check_who_is_lost(arrive, page)
+    (ten, twenty) = (minutes_of(tmp_path / "four-rooms-seeds", frames) for frames in (10_000_000, 20_000_000))
+    assert len(ten) == 8 and len(twenty) == 4
+    told = f"{min(ten):.0f} to {max(ten):.0f} minutes for 10 M frames, {min(twenty):.0f} to {max(twenty):.0f} for 20 M."
+    assert told in page
+
+
+def minutes_of(record: Path, frames: int) -> list[float]:
+    """How long the runs of a record took that came to that many frames."""
+    paths = record.glob("runs/*/metrics.jsonl")
+    ends = [json.loads(path.read_text(encoding="utf-8").splitlines()[-1]) for path in paths]
+    return [end["seconds"] / 60 for end in ends if end["frames"] == frames]
 
 
 def arrivals(run: Mapping[str, Any], episodes: Mapping[str, np.ndarray]) -> dict[str, float]:

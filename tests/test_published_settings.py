@@ -112,7 +112,6 @@ def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Pa
     assert len(seconds) == 40 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in page
 
 
-@pytest.mark.slow
 def test_figure_6_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) -> None:
     unpack("fig6-bathroom", tmp_path / "fig6")
     (section,) = gather(tmp_path / "fig6").sections

@@ -16,7 +16,7 @@ from clearway.experiments.correction import corrected
 from clearway.experiments.groups import Group, Scores
 from clearway.experiments.job import episodes_of
 from clearway.experiments.reproduce import ReproduceRequest, planned
-from clearway.experiments.request_file import REQUEST_FILE, keep_request, with_earlier
+from clearway.experiments.request_file import REQUEST_FILE, keep_request, read_request, with_earlier
 from clearway.experiments.section import Claim
 from clearway.experiments.setting import DEFAULT_REWARDS, Setting, named_rewards, prepare
 from clearway.reward import BUMP, CLEARANCE, SHORTEST, RewardError
@@ -49,10 +49,11 @@ def test_figures_are_those_of_the_rewards_own_agents(setting: Setting) -> None:
     assert [row["agent"] for row in by_heading(section.tables[-1])] == ["clearance", "bump"]
 
 
-def test_shipped_rewards_are_compared_where_none_are_named(setting: Setting) -> None:
+def test_table_1_s_rewards_are_compared_where_none_are_named(setting: Setting) -> None:
+    request = asked(setting.out, "rewards")
+    assert request.rewards is None and list(request.compared) == ["shortest", "bump", "collision-aware"]
     small = small_setting(setting.out, seeds=1)
-    assert {job.run.reward.name for job in rewards.jobs(small)} == {"shortest", "bump", "collision-aware"}
-    assert tuple(reward.name for reward in small.rewards) == DEFAULT_REWARDS
+    assert {job.run.reward.name for job in rewards.jobs(small)} == {*request.compared}
 
 
 @pytest.fixture
@@ -115,6 +116,7 @@ def test_rewards_of_one_s_own_are_asked_for_by_name(setting: Setting, tmp_path: 
     ("names", "asked", "said"),
     [
         (["table1"], ["shortest", "bump"], "those of the experiment rewards. Name it, too, or leave them out"),
+        (["table1"], list(DEFAULT_REWARDS), "those of the experiment rewards. Name it, too, or leave them out"),
         (["rewards"], ["bump"], r"rewards=\['bump'\]: expected two or more, each once"),
         (["rewards"], ["bump", "shortest", "bump"], "expected two or more, each once"),
         (["rewards"], "bump", "rewards='bump': expected a list"),
@@ -135,7 +137,7 @@ def test_a_name_that_is_no_folder_s_is_refused(name: str, monkeypatch) -> None:
         named_rewards(["bump", "odd"])
 
 
-def asked(out: Path, *names: str, rewards: tuple[str, ...] = DEFAULT_REWARDS) -> ReproduceRequest:
+def asked(out: Path, *names: str, rewards: tuple[str, ...] | None = None) -> ReproduceRequest:
     return ReproduceRequest(names, out, "smoke", rewards=rewards)
 
 
@@ -154,18 +156,20 @@ def test_other_experiments_do_not_depend_on_the_rewards_asked_for(tmp_path: Path
         keep_request(other)
 
 
-def test_a_kept_request_for_the_default_rewards_asks_the_same_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("again", [None, DEFAULT_REWARDS])
+def test_a_kept_request_for_the_default_rewards_asks_the_same_again(again, tmp_path: Path) -> None:
     keep_request(asked(tmp_path, "rewards"))
-    kept = (tmp_path / REQUEST_FILE).read_bytes()
-    with warnings.catch_warnings(record=True) as told:
-        keep_request(asked(tmp_path, "rewards"))
-    assert not told and (tmp_path / REQUEST_FILE).read_bytes() == kept
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        keep_request(asked(tmp_path, "fig3", "rewards", rewards=again))
+    assert set(read_request(tmp_path).names) == {"fig3", "rewards"}
 
 
-def test_a_request_that_was_kept_without_rewards_is_gone_on_with(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kept", [[], list(DEFAULT_REWARDS)])
+def test_a_request_that_was_kept_by_an_older_version_is_gone_on_with(kept: list[str], tmp_path: Path) -> None:
     keep_request(asked(tmp_path, "table3"))
     path = tmp_path / REQUEST_FILE
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"rewards": []}))
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"rewards": kept}))
     assert list(with_earlier(asked(tmp_path, "fig3")).names) == ["fig3", "table3"]
 
 

@@ -72,7 +72,6 @@ class Reproduce:
         check_mujoco()
         from clearway.experiments.catalogue import EXPERIMENTS, in_order
         from clearway.experiments.reproduce import ReproduceRequest, reproduce
-        from clearway.experiments.setting import DEFAULT_REWARDS
 
         check_seeds(first_seed=self.first_seed)
         if not self.names:
@@ -89,7 +88,7 @@ class Reproduce:
             seeds=self.seeds,
             first_seed=self.first_seed,
             learners=list(dict.fromkeys(self.learners)),
-            rewards=self.rewards or DEFAULT_REWARDS,
+            rewards=self.rewards or None,
             changes=self.set,
             workers=self.workers,
             threads=self.threads,

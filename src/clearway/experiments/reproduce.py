@@ -18,9 +18,9 @@ from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.request import ReproduceRequest
 from clearway.experiments.request_file import REQUEST_FILE, keep_request, read_request, with_earlier
-from clearway.experiments.rewards import NAME
+from clearway.experiments.rewards import NAME as REWARDS_EXPERIMENT
 from clearway.experiments.section import Section
-from clearway.experiments.setting import DEFAULT_REWARDS, Setting, named_rewards, prepare
+from clearway.experiments.setting import Setting, named_rewards, prepare
 from clearway.plugins import find_plugin
 from clearway.torch_threads import torch_threads
 
@@ -108,7 +108,7 @@ def gather(out: Path | str) -> Reproduction:
         ClearwayError: the folder holds no reproduction, or its scenes cannot be read.
     """
     request = read_request(Path(out))
-    return _gathered(request, _setting(replace(request, rewards=DEFAULT_REWARDS), build=False))
+    return _gathered(request, _setting(replace(request, rewards=None), build=False))
 
 
 def _packages(names: Sequence[str]) -> dict[str, str]:
@@ -129,14 +129,14 @@ def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
     jobs, sections = list[Job](), list[Section]()
     known = _known(request)
     try:
-        if NAME in known:
-            setting = replace(setting, rewards=named_rewards(request.rewards))
+        if REWARDS_EXPERIMENT in known:
+            setting = replace(setting, rewards=named_rewards(request.compared))
     except ClearwayError as fault:
         told = f"{request.out / REQUEST_FILE}: {fault}. Run the command in the folder where a module of your own lies"
-        if known == [NAME]:
+        if known == [REWARDS_EXPERIMENT]:
             raise RunError(told) from fault
-        warnings.warn(f"{told}. The report leaves the experiment {NAME} out", stacklevel=3)
-        known.remove(NAME)
+        warnings.warn(f"{told}. The report leaves the experiment {REWARDS_EXPERIMENT} out", stacklevel=3)
+        known.remove(REWARDS_EXPERIMENT)
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
         for found in map(experiment, known):
             own = found.jobs(setting)
@@ -201,7 +201,7 @@ def _setting(request: ReproduceRequest, *, build: bool = True, show_progress: bo
         seeds=request.seeds,
         first_seed=request.first_seed,
         learners=request.learners,
-        rewards=request.rewards,
+        rewards=request.compared,
         changes=request.changes,
         build=build,
         show_progress=show_progress,

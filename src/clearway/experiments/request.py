@@ -29,7 +29,8 @@ class ReproduceRequest:
         seeds: how many; None: as the budget says.
         first_seed: of them; the others follow it.
         learners: names among `setting.LEARNERS`.
-        rewards: names of those that the experiment `rewards` compares, see `reward.reward_named`.
+        rewards: names of those that the experiment `rewards` compares, see `reward.reward_named`; None: shipped ones,
+            where that experiment is asked for.
         changes: of settings of every learner, such as "lr_start=0.002".
         workers: jobs side by side; None: as many as cores and memory allow.
         threads: of each job.
@@ -53,7 +54,7 @@ class ReproduceRequest:
     seeds: int | None = None
     first_seed: int = 0
     learners: Sequence[LearnerName] = ("paper", "default")
-    rewards: Sequence[str] = DEFAULT_REWARDS
+    rewards: Sequence[str] | None = None
     changes: Sequence[str] = ()
     workers: int | None = None
     threads: int = 1
@@ -69,15 +70,16 @@ class ReproduceRequest:
         _check_words("learners", self.learners, get_args(LearnerName))
         if self.rooms is not None:
             _check_words("rooms", self.rooms, get_args(RoomName))
-        for name in ("names", "rewards", "changes", "commands"):
-            if others := [text for text in _listed(name, getattr(self, name)) if not isinstance(text, str)]:
+        texts = {name: getattr(self, name) for name in ("names", "changes", "commands")} | {"rewards": self.compared}
+        for name, given in texts.items():
+            if others := [text for text in _listed(name, given) if not isinstance(text, str)]:
                 raise ArgumentError(f"{name}: holds {others[0]!r:.40}, expected texts. Correct it")
         if not self.names:
             raise ArgumentError("names: no experiment is named. Name some")
-        if tuple(self.rewards) != DEFAULT_REWARDS and REWARDS_EXPERIMENT not in self.names:
+        if self.rewards is not None and REWARDS_EXPERIMENT not in self.names:
             raise ArgumentError("rewards are those of the experiment rewards. Name it, too, or leave them out")
-        if len({*self.rewards}) < max(2, len(self.rewards)):
-            raise ArgumentError(f"rewards={list(self.rewards)!r:.80}: expected two or more, each once. Correct it")
+        if len({*self.compared}) < max(2, len(self.compared)):
+            raise ArgumentError(f"rewards={list(self.compared)!r:.80}: expected two or more, each once. Correct it")
         for name, least in (("frames", 1), ("seeds", 1), ("first_seed", 0), ("workers", 1), ("threads", 1)):
             _check_number(name, getattr(self, name), least, optional=name not in ("first_seed", "threads"))
         for name, text in (("encoder", self.encoder), ("ray", self.ray or "")):
@@ -94,6 +96,11 @@ class ReproduceRequest:
             raise ArgumentError(f"{told}. Leave one out")
         if not isinstance(self.packages, dict) or not all(isinstance(t, str) for t in self.packages.values()):
             raise ArgumentError(f"packages={self.packages!r:.40}: expected texts by name. Correct it")
+
+    @property
+    def compared(self) -> Sequence[str]:
+        """Names of the rewards that the experiment `rewards` compares, where it is asked for."""
+        return DEFAULT_REWARDS if self.rewards is None else self.rewards
 
 
 def _path(name: str, given: object) -> Path:

@@ -11,7 +11,7 @@ from clearway.errors import RunError
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import in_order
 from clearway.experiments.request import ReproduceRequest
-from clearway.experiments.rewards import NAME
+from clearway.experiments.rewards import NAME as REWARDS_EXPERIMENT
 from clearway.experiments.setting import changed_learners
 from clearway.files import locked, read_json, written_whole
 
@@ -30,8 +30,8 @@ def read_request(out: Path) -> ReproduceRequest:
     try:
         content = read_json(path)
         dumps = [out / dump for dump in content.pop("dumps")]  # a record's lie in the folder
-        if not content.get("rewards", True):  # kept before the default had names
-            del content["rewards"]
+        if REWARDS_EXPERIMENT not in content["names"] or not content.get("rewards"):
+            content["rewards"] = None  # also where it was kept as an empty list, or as the names of the default
         return ReproduceRequest(out=out, dumps=dumps, **content)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
@@ -58,7 +58,7 @@ def with_earlier(request: ReproduceRequest) -> ReproduceRequest:
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
     packages = {**earlier.packages, **request.packages}
-    rewards = request.rewards if NAME in request.names else earlier.rewards
+    rewards = request.rewards if REWARDS_EXPERIMENT in request.names else earlier.rewards
     return replace(request, names=in_order(names), rewards=rewards, commands=tuple(commands), packages=packages)
 
 
@@ -67,8 +67,8 @@ def _earlier(request: ReproduceRequest) -> tuple[ReproduceRequest | None, bool]:
     try:
         earlier = read_request(request.out)
         same = _question(request) == _question(earlier)
-        if same and NAME in request.names and NAME in earlier.names:
-            same = list(request.rewards) == list(earlier.rewards)
+        if same and all(REWARDS_EXPERIMENT in asked.names for asked in (request, earlier)):
+            same = list(request.compared) == list(earlier.compared)
         return earlier, same
     except RunError:
         return None, False

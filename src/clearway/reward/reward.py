@@ -1,178 +1,41 @@
-"""The reward: a list of named terms, each a small function of tables (paper, equation 1, and more).
+"""The reward: a list of named terms (paper, equation 1, and more).
 
     f(s_t) = 10 at the target, alpha on an ordinary step, beta in the collision zone, gamma in the precollision zone,
 
-by the pose the agent arrives in; a blocked move arrives in the pose it left. A term takes what the terms before it let
-every action of every pose earn, (S, A), and gives back what it earns now; `Arrival` says what reaching the target earns
-in place of all that. `Reward.table` is the only place where a step's earnings are computed: environments, hindsight,
-look-ahead and the exact oracles look them up there.
-
-The module is light, so that the command line can read names and parameters from it. Axis letters: S states, A actions.
+by the pose the agent arrives in; a blocked move arrives in the pose it left. `Reward.table` is the only place where a
+step's earnings are computed: environments, hindsight, look-ahead and the exact oracles look them up there.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from clearway.errors import ClearwayError, PluginError, kind_and_reason
-from clearway.own_code import code_of, not_importable
-from clearway.plugins import find_plugin, imported, load_plugin, offered
+from clearway.errors import kind_and_reason
+from clearway.own_code import not_importable
+from clearway.reward.terms import (
+    TERM_OF,
+    TERMS,
+    Arrival,
+    Bump,
+    Clearance,
+    Moves,
+    RewardError,
+    Term,
+    Time,
+    UnknownTerm,
+    Zones,
+    in_order,
+)
 from clearway.spelling import did_you_mean
 
 if TYPE_CHECKING:
     import numpy as np
 
 CLIP = 1.0
-
-
-class RewardError(ClearwayError, ValueError):
-    """A reward that does not exist or cannot be used."""
-
-
-@dataclass(frozen=True)
-class Moves:
-    """Tables of a world that terms look at.
-
-    Attributes:
-        next_state: (S, A) int64, where each action leads; a blocked move leads back to its own state.
-        blocked: (S, A) bool.
-        zone: (S,) int, see `zones.Zone`.
-        clearance_m: (S,) float64, distance to the nearest obstacle, see `clearance`.
-    """
-
-    next_state: np.ndarray
-    blocked: np.ndarray
-    zone: np.ndarray
-    clearance_m: np.ndarray
-
-
-def parameter(default: float | None, meaning: str) -> Any:
-    """A parameter of a term: a dataclass field that says what it means, for the command line's help."""
-    return field(default=default, metadata={"help": meaning})
-
-
-@dataclass(frozen=True)
-class Term:
-    """A part of a reward. One of your own is a frozen dataclass whose fields, numbers or texts, are its parameters."""
-
-    _digest_of_code: ClassVar[str | None] = None
-
-    def __init_subclass__(cls, **given: Any) -> None:
-        """Keep what the code of one of your own is as it is made: its file may change while it is in use."""
-        super().__init_subclass__(**given)
-        cls._digest_of_code = code_of(cls)
-
-    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
-        """What every action earns with this term, (S, A) float64, from what it earned before it."""
-        raise NotImplementedError(f"{type(self).__name__} does not say what it earns")
-
-
-@dataclass(frozen=True)
-class Time(Term):
-    """What every step costs."""
-
-    alpha: float = parameter(-0.01, "Reward of an ordinary step.")
-
-    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
-        """Added everywhere."""
-        return earned + self.alpha
-
-
-@dataclass(frozen=True)
-class Zones(Term):
-    """What a step near an obstacle earns instead, by the zone of the pose that it ends in; None: as elsewhere."""
-
-    beta: float | None = parameter(None, "Reward of a step into the collision zone.")
-    gamma: float | None = parameter(None, "Reward of a step into the precollision zone.")
-
-    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
-        """In place of what was earned."""
-        import numpy as np
-
-        from clearway.zones import Zone
-
-        zone = moves.zone[moves.next_state]
-        for value, where in ((self.beta, Zone.COLLISION), (self.gamma, Zone.PRECOLLISION)):
-            earned = earned if value is None else np.where(zone == where, value, earned)
-        return earned
-
-
-@dataclass(frozen=True)
-class Bump(Term):
-    """What a blocked move earns instead, whatever the zone."""
-
-    blocked: float = parameter(-0.1, "Reward of a blocked move.")
-
-    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
-        """In place of what was earned."""
-        import numpy as np
-
-        return np.where(moves.blocked, self.blocked, earned)
-
-
-@dataclass(frozen=True)
-class Clearance(Term):
-    """What a step costs that ends close to an obstacle: all of it at the obstacle, linearly less up to a distance.
-
-    earned - clearance * max(0, 1 - distance / clearance_m)
-    """
-
-    clearance: float = parameter(0.02, "Cost of a step that ends at an obstacle, falling to nothing at clearance_m.")
-    clearance_m: float = parameter(0.5, "Distance from which an obstacle costs nothing, metres.")
-
-    def __post_init__(self) -> None:
-        """Raise RewardError where there is no such distance."""
-        if not isinstance(self.clearance_m, Real) or not self.clearance_m > 0:
-            raise RewardError(f"--clearance-m is {self.clearance_m!r:.40}, expected more than 0. Give a distance")
-
-    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
-        """Subtracted near obstacles."""
-        import numpy as np
-
-        near = np.maximum(0.0, 1.0 - moves.clearance_m / self.clearance_m)
-        return earned - self.clearance * near[moves.next_state]
-
-
-@dataclass(frozen=True)
-class Arrival(Term):
-    """What reaching the target earns, in place of all that a step earns else."""
-
-    terminal: float = parameter(10.0, "Reward of reaching the target.")
-
-    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
-        """The same wherever the target is."""
-        import numpy as np
-
-        return np.full_like(earned, self.terminal)
-
-
-TERMS: dict[str, type[Term]] = {"time": Time, "zones": Zones, "bump": Bump, "clearance": Clearance, "arrival": Arrival}
-"""Terms of ours by name, in the order in which they apply; terms of your own come before `arrival`."""
-TERM_OF = {own.name: kind for kind in TERMS.values() for own in fields(kind)}
-"""The term that each parameter belongs to; no two terms share a name."""
-
-
-@dataclass(frozen=True)
-class UnknownTerm(Term):
-    """A term of somebody's own, as a run's record tells of it: its code is not loaded because a file names it."""
-
-    path: str
-    parameters: tuple[tuple[str, Any], ...]
-    code: str | None = None
-
-    @property
-    def called(self) -> str:
-        """The name of its class."""
-        return self.path.rpartition(":")[2]
-
-    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
-        """Raises RewardError."""
-        raise RewardError(f"the reward has the term {self.path}, which is not loaded. Name the reward itself")
 
 
 @dataclass(frozen=True)
@@ -393,13 +256,6 @@ def _as_plain(value: object) -> int | float:
     raise TypeError(f"a {type(value).__name__}")
 
 
-def in_order(terms: Mapping[type[Term], Term]) -> tuple[Term, ...]:
-    """Ours as in `TERMS`, others before `Arrival`."""
-    ours = [terms[kind] for kind in TERMS.values() if kind in terms and kind is not Arrival]
-    others = [term for kind, term in terms.items() if kind not in TERMS.values()]
-    return (*ours, *others, *(term for kind, term in terms.items() if kind is Arrival))
-
-
 COLLISION_AWARE = Reward("collision-aware", (Time(-0.01), Zones(beta=-0.02, gamma=-0.011), Arrival(10.0)))
 """The paper's reward."""
 SHORTEST = Reward("shortest", (Time(-0.01), Arrival(10.0)))
@@ -410,41 +266,3 @@ CLEARANCE = Reward("clearance", (Time(-0.01), Clearance(0.02, 0.5), Arrival(10.0
 """The closer to an obstacle a step ends, the more it costs."""
 
 REWARDS: dict[str, Reward] = {reward.name: reward for reward in (COLLISION_AWARE, SHORTEST, BUMP, CLEARANCE)}
-
-
-def reward_named(name: str | Reward) -> Reward:
-    """The reward of a name: one of `REWARDS`, another package's (`plugins`), or a user's own as `package.module:name`.
-
-    What is named is a `Reward`, or a function without arguments that gives one.
-
-    Raises:
-        RewardError: there is none.
-        PluginError: two packages offer one of this name, or it cannot be imported.
-    """
-    if isinstance(name, Reward):
-        return name
-    if isinstance(name, str) and name in REWARDS:
-        return REWARDS[name]
-    if isinstance(name, str) and (plugin := find_plugin("rewards", name)):
-        return _made(str(plugin), load_plugin(plugin))
-    if not isinstance(name, str) or ":" not in name:
-        names = (*REWARDS, *offered("rewards"))
-        told = f"reward={name!r:.80} is unknown.{did_you_mean(name, names)}"
-        raise RewardError(f"{told} Use one of {', '.join(map(repr, names))}, a Reward, or package.module:name")
-    try:
-        found = imported(name)
-    except PluginError as fault:
-        raise RewardError(f"reward={fault}") from fault
-    return _made(f"reward={name!r}", found)
-
-
-def _made(source: str, found: object) -> Reward:
-    """What was found under a name, or what it gives when it is called."""
-    try:
-        made = found() if callable(found) else found
-    except (Exception, SystemExit) as fault:  # likewise
-        reason = kind_and_reason(fault)
-        raise RewardError(f"{source}: cannot be made ({reason}). Correct it") from fault
-    if not isinstance(made, Reward):
-        raise RewardError(f"{source}: gives {made!r:.60}, expected a clearway.Reward. Correct it")
-    return made
