@@ -161,7 +161,7 @@ def test_zones_or_a_larger_step_in_four_rooms_is_what_its_record_comes_to(tmp_pa
     assert f"reach from {least:.0f} to {most:.0f} % to a side" in part
     assert check_beside(lines, table.rows, 2, 3) == MAPS | {"shortest path", "random walk"}
     cost = -zones_or_step.mean_cost(gather(folder).setting)
-    assert f"every step costs {cost:.6f}" in part and "mean frames lie within 3 %" in RESULTS
+    assert f"every step costs {cost:.6f}" in part
     seconds = [s for reward in ("dearer", "shuffled") for s in seconds_of_runs(folder, f"ppo-{reward}-*")]
     assert len(seconds) == 10 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in part
 
