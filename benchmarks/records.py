@@ -109,8 +109,14 @@ def _given(folder: Path) -> list[Path]:
 
 def _by_its_name(content: bytes, places: Sequence[Path]) -> bytes:
     """What a file holds, without where on this machine some folders and the command lie."""
-    for place in places:
-        content = content.replace(f"{place.resolve().parent}/".encode(), b"")
+    for place in map(Path.resolve, places):
+        below_root = place.parent == place.parent.parent  # whose slash is part of every path
+        told = str(place) if below_root else f"{place.parent}/"
+        for text in dict.fromkeys((told, json.dumps(told)[1:-1])):  # as it is, and as JSON files have it
+            if below_root:
+                content = re.sub(rb"(?<![\w./-])/(?=" + re.escape(text[1:]).encode() + rb"(?![\w.-]))", b"", content)
+            else:
+                content = content.replace(text.encode(), b"")
     return re.sub(rb'"/[^"]*/clearway"', b'"clearway"', content)
 
 

@@ -21,6 +21,8 @@ from helpers.own_terms import DEARER, NAME, SOURCE, imported
         ("SHARE = 0.5", "SHARE = 0.6"),
         ("earned * SHARE", "earned / SHARE"),
         ('ACTIONS["right"] = 1', 'ACTIONS["right"] = 2'),
+        ("ACTIONS.update(left=0)", "ACTIONS.update(left=2)"),
+        ("ACTIONS.update(left=0)", "ACTIONS.update(left=0)\nACTIONS.setdefault('up', []).append(2)"),
         ("return share(earned)", "return share(earned) / 2"),
         ("floor as rounded", "trunc as rounded"),
         ("from math import floor", "from numpy import floor"),
@@ -43,6 +45,7 @@ def test_what_a_class_uses_of_its_file_is_its_code(edit, tmp_path: Path, monkeyp
     "edit",
     [
         ("UNUSED = 1\n", "UNUSED = 2\n"),
+        ("UNUSED = 1\n", "UNUSED = 1\nnp.seterr()\nprint(ACTIONS)\n"),
         ("return UNUSED", "return 7"),
         ("return UNUSED", "rounded = UNUSED\n    return rounded"),
         ('"few-turns"', '"fewer"'),

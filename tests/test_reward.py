@@ -21,6 +21,7 @@ from clearway.reward import (
     RewardError,
     Term,
     Time,
+    UnknownTerm,
     Zones,
     reward_named,
 )
@@ -43,6 +44,11 @@ MOVES = Moves(
 def steps(reward: Reward, action: int = MOVED) -> list[float]:
     """What steps into the three poses earn."""
     return reward.table(MOVES)[NOT_REACHED, :, action].tolist()
+
+
+@dataclass(frozen=True)
+class OwnArrival(Arrival):
+    """A term of one's own that would stand in for ours."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +136,10 @@ def test_changes_that_cannot_be(parameters: dict, message: str) -> None:
     ("terms", "message"),
     [
         ((Time(),), "expected one term Arrival"),
+        ((Time(), OwnArrival()), "expected one term Arrival itself"),
+        ((Time(), OwnArrival(), Arrival()), "expected one term Arrival itself"),
+        ((Doubled([2.0]), Arrival()), r"factor of the term Doubled is \[2.0\], which may change. Give a number"),
+        ((Doubled(([2.0],)), Arrival()), "which may change"),
         ((Time(), Time(), Arrival()), "a term occurs twice"),
         ((abs, Arrival()), "is no term"),
         (
@@ -159,6 +169,13 @@ def test_terms_that_earn_nonsense() -> None:
         def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
             return earned[0]
 
+    @dataclass(frozen=True)
+    class Ragged(Term):
+        def __call__(self, earned: np.ndarray, moves: Moves) -> Any:
+            return [[1.0, 2.0], [3.0]]
+
+    with pytest.raises(RewardError, match=r"the term Ragged failed \(ValueError: .* Correct the term"):
+        Reward("wrong", (Ragged(), Arrival())).table(MOVES)
     with pytest.raises(RewardError, match=r"Flat gives float64 \(2,\), expected \(S, A\) float64, \(3, 2\)"):
         Reward("wrong", (Flat(), Arrival())).table(MOVES)
 
@@ -247,6 +264,13 @@ def test_a_term_of_one_s_own_is_told_in_json_and_not_loaded_from_it() -> None:
     assert read.as_known().table(MOVES).max() == 5.0
     with pytest.raises(RewardError, match="Doubled, which is not loaded"):
         read.table(MOVES)
+
+
+def test_several_terms_that_are_not_loaded_stay_through_changes() -> None:
+    others = (UnknownTerm("own:First", ()), UnknownTerm("own:Second", (("cost", 2),)))
+    read = Reward("read", (Time(), *others, Arrival()))
+    assert reward_from_json(read.to_json()) == read
+    assert read.with_changes(alpha=-0.5).terms == (Time(-0.5), *others, Arrival())
 
 
 def test_the_code_of_a_term_is_told_as_it_was_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,6 +105,12 @@ def collector_rests() -> Iterator[None]:
             gc.enable()
 
 
+def children_import_program() -> bool:
+    """A child of `multiprocessing` imports the program that was started, so that it knows the program's classes."""
+    path = getattr(sys.modules["__main__"], "__file__", None)
+    return path is not None and os.path.isfile(path)
+
+
 def check_program() -> None:
     """Refuse a program that a child of `multiprocessing` cannot import, as all of them do when they begin.
 

@@ -18,8 +18,9 @@ DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 def code_of(kind: type) -> str | None:
     """Digest of the source of a class and its bases, as it stands in their files now.
 
-    To it belong the parts of the same files that the class names: functions, constants, imports, and what these name.
-    The rest of the file may change, and so does what is imported without being told of.
+    To it belong the parts of the same files that the class names: functions, constants, imports, and what these name,
+    with what assigns to them or calls a method of theirs. The rest of the file may change without being told of, and so
+    may what is imported, or what a function called there does to a constant.
 
     Returns:
         None for a class of clearway's or Python's, and where no source can be had.
@@ -68,18 +69,21 @@ def _parts(kind: type) -> list[str]:
 def _definitions(text: str) -> Iterator[tuple[set[str], set[str], str]]:
     """Every statement of a module, each import alone: the names that it binds or changes, those it uses, its text."""
     lines = re.split(r"\r\n|\r|\n", text)  # as `ast` counts them; `splitlines` splits at form feeds, too
-    for statement in ast.parse(text).body:
+    body = ast.parse(text).body
+    imported = set[str]().union(*(_bound(each) for each in body if isinstance(each, ast.Import | ast.ImportFrom)))
+    for statement in body:
         if isinstance(statement, ast.Import | ast.ImportFrom):
             for alias in statement.names:
                 level, module = getattr(statement, "level", 0), getattr(statement, "module", None)
                 yield _bound(alias), set(), f"{'.' * level}{module or ''}:{alias.name}:{alias.asname or ''}"
         else:
             first = min([statement.lineno, *(each.lineno for each in getattr(statement, "decorator_list", ()))])
-            yield _bound(statement), _names(statement), "\n".join(lines[first - 1 : statement.end_lineno])
+            bound = _bound(statement) | (_called_on(statement) - imported)
+            yield bound, _names(statement), "\n".join(lines[first - 1 : statement.end_lineno])
 
 
 def _bound(statement: ast.AST) -> set[str]:
-    """Names that a statement binds, or changes: `TABLE["turn"] = 3` changes TABLE. Calls are not followed."""
+    """Names that a statement binds, or changes: `TABLE["turn"] = 3` changes TABLE."""
     if isinstance(statement, DEFINITIONS):
         return {statement.name}
     found = set[str]()
@@ -91,6 +95,15 @@ def _bound(statement: ast.AST) -> set[str]:
         elif isinstance(getattr(node, "ctx", None), ast.Store):
             found |= _names(node)
     return found
+
+
+def _called_on(statement: ast.AST) -> set[str]:
+    """The name whose method a statement calls, and so may change: of `TABLE.update(turn=3)` TABLE."""
+    called = statement.value.func if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call) else None
+    owner = called.value if isinstance(called, ast.Attribute) else None
+    while isinstance(owner, ast.Attribute | ast.Subscript | ast.Call):
+        owner = owner.func if isinstance(owner, ast.Call) else owner.value
+    return {owner.id} if isinstance(owner, ast.Name) else set()
 
 
 def _names(tree: ast.AST) -> set[str]:

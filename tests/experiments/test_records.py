@@ -95,6 +95,23 @@ def test_scenes_that_were_given_are_in_the_record(tmp_path: Path) -> None:
     assert gather(tmp_path / "third").sections == expected
 
 
+@pytest.mark.parametrize(
+    ("place", "kept"),
+    [
+        ("/out", b'["out/x.h5", "out", "/tmp/out/", "/outer", "https://x.org//y"]'),
+        ("/tmp/out", b'["/out/x.h5", "/out", "out/", "/outer", "https://x.org//y"]'),
+    ],
+)
+def test_where_a_folder_lay_is_not_told_and_all_else_is(place: str, kept: bytes) -> None:
+    told = b'["/out/x.h5", "/out", "/tmp/out/", "/outer", "https://x.org//y"]'
+    assert RECORDS["_by_its_name"](told, [Path(place)]) == kept
+
+
+def test_where_a_folder_with_other_letters_lay_is_not_told_either() -> None:
+    for told in (json.dumps("/srv/jos\u00e9/run"), json.dumps("/srv/jos\u00e9/run", ensure_ascii=False)):
+        assert RECORDS["_by_its_name"](told.encode(), [Path("/srv/jos\u00e9/run")]) == b'"run"'
+
+
 def test_the_same_folder_gives_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     first, second = tmp_path / "first.tar.xz", tmp_path / "second.tar.xz"
     RECORDS["pack"](folder, first)

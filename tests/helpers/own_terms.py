@@ -18,6 +18,7 @@ from math import floor as rounded, ceil
 SHARE = 0.5
 ACTIONS = {}
 ACTIONS["right"] = 1
+ACTIONS.update(left=0)
 UNUSED = 1
 
 

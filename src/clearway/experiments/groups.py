@@ -21,7 +21,7 @@ from clearway.world.world import World
 
 PAIR: tuple[Reward, ...] = (SHORTEST, COLLISION_AWARE)
 """The two rewards that the paper compares."""
-REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE, CLEARANCE)
+PAIR_AND_RIVALS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE, CLEARANCE)
 """`PAIR` and two rivals, compared where agents see other pictures than in training: off the grid, and perturbed."""
 REWARD_PAIRS = ((COLLISION_AWARE, SHORTEST), (COLLISION_AWARE, BUMP), (CLEARANCE, SHORTEST))
 """Of which it is claimed there that the first collides less than the second."""

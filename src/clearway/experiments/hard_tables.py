@@ -16,7 +16,7 @@ from clearway.experiments.other_learners import other_learners
 from clearway.experiments.paper_numbers import TABLE_2, TABLE_3, PaperRow
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import Claim, Section
-from clearway.experiments.setting import REWARDS, Setting
+from clearway.experiments.setting import TABLE_1_REWARDS, Setting
 from clearway.experiments.table1 import claims
 from clearway.experiments.verdicts import judged_more, judged_no_more
 from clearway.world.world import World
@@ -86,7 +86,7 @@ class HardTable:
             yield claim if len(easy) else replace(claim, evidence=NO_EASY)
 
     def _groups(self, setting: Setting) -> list[Group]:
-        return compared(setting, REWARDS, targets=chosen(setting), frames_factor=self.frames_factor)
+        return compared(setting, TABLE_1_REWARDS, targets=chosen(setting), frames_factor=self.frames_factor)
 
 
 def _detours(setting: Setting, groups: Sequence[Group], learner: str, world: World) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
 from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments.groups import REWARD_PAIRS, REWARDS, WALKED
+from clearway.experiments.groups import PAIR_AND_RIVALS, REWARD_PAIRS, WALKED
 from clearway.experiments.hindrance import feasible, hindrance
 from clearway.experiments.job import any_walked, trial_path, unfinished
 from clearway.experiments.live_trial import FIGURES, read_live
@@ -79,9 +79,9 @@ def _planned(setting: Setting) -> dict[Row, tuple[Job, ...]]:
     found = {
         (name, reward.name): _tried(setting, setting.runs(learner, reward), "agent")
         for name, learner in setting.learners.items()
-        for reward in REWARDS
+        for reward in PAIR_AND_RIVALS
     }
-    beside = setting.runs(next(iter(setting.learners.values())), REWARDS[0])
+    beside = setting.runs(next(iter(setting.learners.values())), PAIR_AND_RIVALS[0])
     frames = f"{frames_of(setting.world(), MOST_A_POSE):,} frames"
     found[NEAREST, frames] = _tried(setting, beside, NEAREST)
     found[WALKED, RANDOM_WALK] = _tried(setting, beside, RANDOM_WALK)

@@ -9,7 +9,16 @@ from itertools import chain
 import numpy as np
 
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
-from clearway.experiments.groups import EXACT, PAIR, REWARD_PAIRS, REWARDS, WALKED, Scores, random_walk, scores_of
+from clearway.experiments.groups import (
+    EXACT,
+    PAIR,
+    PAIR_AND_RIVALS,
+    REWARD_PAIRS,
+    WALKED,
+    Scores,
+    random_walk,
+    scores_of,
+)
 from clearway.experiments.hindrance import feasible, hindrance
 from clearway.experiments.job import any_walked, unfinished
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, PerturbedPictures, PlannedRun, WalkerName
@@ -93,7 +102,7 @@ def _planned(setting: Setting) -> dict[Row, tuple[Job, ...]]:
     for name, learner in setting.learners.items():
         if not learner.sees_takes:
             continue
-        for reward in REWARDS if setting.budget.whole_grid else PAIR:
+        for reward in PAIR_AND_RIVALS if setting.budget.whole_grid else PAIR:
             runs = setting.runs(learner, reward)
             trained[name, reward.name, TOO] = tuple(replace(run, perturbed=EVERYTHING) for run in runs)
             if reward == COLLISION_AWARE:

@@ -62,8 +62,8 @@ def reproduce(
             interrupts it, how to go on; None: nobody asks.
 
     Raises:
-        ClearwayError: a scene cannot be had, no process could import a reward's terms, or a run failed; what is
-            complete stays.
+        ClearwayError: a scene cannot be had, a learner cannot be paid by a reward, no process could import a reward's
+            terms, or a run failed; what is complete stays.
         KeyboardInterrupt: the user interrupted; the same command goes on.
 
     Warns:
@@ -73,6 +73,8 @@ def reproduce(
     setting = _setting(request, show_progress=show_progress)
     jobs = planned(setting, request.names)  # before it is kept: what cannot be asked of these scenes is refused
     left = [job for job in jobs if not is_done(request.out, job)]
+    for job in jobs:
+        _ = job.run.paid
     for job in left:
         job.run.reward.check_sent()
     keep_request(request)
@@ -132,7 +134,9 @@ def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
         if REWARDS_EXPERIMENT in known:
             setting = replace(setting, rewards=named_rewards(request.compared))
     except ClearwayError as fault:
-        told = f"{request.out / REQUEST_FILE}: {fault}. Run the command in the folder where a module of your own lies"
+        told = f"{request.out / REQUEST_FILE}: {fault}"
+        if isinstance(fault.__cause__, PluginError):  # its module is not found
+            told += ". Run the command in the folder where a module of your own lies"
         if known == [REWARDS_EXPERIMENT]:
             raise RunError(told) from fault
         warnings.warn(f"{told}. The report leaves the experiment {REWARDS_EXPERIMENT} out", stacklevel=3)

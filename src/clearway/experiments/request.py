@@ -76,6 +76,8 @@ class ReproduceRequest:
                 raise ArgumentError(f"{name}: holds {others[0]!r:.40}, expected texts. Correct it")
         if not self.names:
             raise ArgumentError("names: no experiment is named. Name some")
+        if len({*self.names}) < len(self.names):
+            raise ArgumentError(f"names={list(self.names)!r:.80}: expected each once. Correct it")
         if self.rewards is not None and REWARDS_EXPERIMENT not in self.names:
             raise ArgumentError("rewards are those of the experiment rewards. Name it, too, or leave them out")
         if len({*self.compared}) < max(2, len(self.compared)):
@@ -94,7 +96,7 @@ class ReproduceRequest:
         if self.workers is not None and self.ray not in (None, "local"):
             told = f"ray={self.ray}: says how many fit, and --workers (workers in Python) are this machine's"
             raise ArgumentError(f"{told}. Leave one out")
-        if not isinstance(self.packages, dict) or not all(isinstance(t, str) for t in self.packages.values()):
+        if not isinstance(self.packages, Mapping) or not all(isinstance(t, str) for t in self.packages.values()):
             raise ArgumentError(f"packages={self.packages!r:.40}: expected texts by name. Correct it")
 
     @property

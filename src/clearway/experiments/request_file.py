@@ -7,7 +7,7 @@ import warnings
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from clearway.errors import RunError
+from clearway.errors import RunError, reason_of
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import in_order
 from clearway.experiments.request import ReproduceRequest
@@ -42,7 +42,7 @@ def read_request(out: Path) -> ReproduceRequest:
 def keep_request(request: ReproduceRequest) -> None:
     """Write the file: what is asked, and what was asked before where both stand in one report.
 
-    Warns where the last request asks something else, so that its report is replaced.
+    Warns where the last request asks something else, or cannot be read, so that its report is replaced.
     """
     kept = request.out / REQUEST_FILE
     with locked(kept), written_whole(kept) as part:  # none of two that begin together is lost
@@ -52,9 +52,12 @@ def keep_request(request: ReproduceRequest) -> None:
 
 def with_earlier(request: ReproduceRequest) -> ReproduceRequest:
     """The request, and the experiments that the folder's last one asked for where all else is alike."""
-    earlier, same = _earlier(request)
-    if earlier is None or not same:
-        return request
+    try:
+        earlier, same = _earlier(request)
+    except RunError:
+        same = False
+    if not same:
+        return replace(request, names=in_order(request.names))
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
     packages = {**earlier.packages, **request.packages}
@@ -62,26 +65,34 @@ def with_earlier(request: ReproduceRequest) -> ReproduceRequest:
     return replace(request, names=in_order(names), rewards=rewards, commands=tuple(commands), packages=packages)
 
 
-def _earlier(request: ReproduceRequest) -> tuple[ReproduceRequest | None, bool]:
-    """The folder's last request, None where there is none that could be gone on with; and whether it asks the same."""
-    try:
-        earlier = read_request(request.out)
-        same = _question(request) == _question(earlier)
-        if same and all(REWARDS_EXPERIMENT in asked.names for asked in (request, earlier)):
-            same = list(request.compared) == list(earlier.compared)
-        return earlier, same
-    except RunError:
-        return None, False
+def _earlier(request: ReproduceRequest) -> tuple[ReproduceRequest, bool]:
+    """The folder's last request, and whether it asks the same.
+
+    Raises:
+        RunError: there is none, or none that could be gone on with.
+    """
+    earlier = read_request(request.out)
+    same = _question(request) == _question(earlier)
+    if same and all(REWARDS_EXPERIMENT in asked.names for asked in (request, earlier)):
+        same = list(request.compared) == list(earlier.compared)
+    return earlier, same
 
 
 def _warn_of_another(request: ReproduceRequest) -> None:
-    earlier, same = _earlier(request)
-    if earlier is None or same:
+    if not (request.out / REQUEST_FILE).exists():
         return
-    first, count = earlier.first_seed, earlier.seeds or BUDGETS[earlier.budget].seeds
-    seeds = f"seed {first}" if count == 1 else f"seeds {first} to {first + count - 1}"
-    told = f"{request.out} held a reproduction of {', '.join(earlier.names)}, {seeds}; this one takes its place"
-    warnings.warn(f"{told} in the report. Its runs stay; use another --out to keep both", stacklevel=4)
+    try:
+        earlier, same = _earlier(request)
+    except RunError as fault:
+        held = f"a reproduction that cannot be gone on with ({reason_of(fault)})"
+    else:
+        if same:
+            return
+        first, count = earlier.first_seed, earlier.seeds or BUDGETS[earlier.budget].seeds
+        seeds = f"seed {first}" if count == 1 else f"seeds {first} to {first + count - 1}"
+        held = f"a reproduction of {', '.join(earlier.names)}, {seeds}"
+    told = f"{request.out} held {held}; this one takes its place in the report"
+    warnings.warn(f"{told}. Its runs stay; use another --out to keep both", stacklevel=4)
 
 
 def _question(request: ReproduceRequest) -> str:

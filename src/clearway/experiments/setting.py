@@ -39,9 +39,9 @@ ABOUT_LEARNERS: Mapping[str, str] = {
 }
 
 
-REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE)
+TABLE_1_REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE)
 """Of the main experiment."""
-DEFAULT_REWARDS = tuple(own.name for own in REWARDS)
+DEFAULT_REWARDS = tuple(own.name for own in TABLE_1_REWARDS)
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Setting:
     budget: Budget
     seeds: tuple[int, ...]
     learners: Mapping[str, Learner]
-    rewards: tuple[Reward, ...] = REWARDS
+    rewards: tuple[Reward, ...] = TABLE_1_REWARDS
 
     @property
     def original(self) -> bool:

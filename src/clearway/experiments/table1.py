@@ -11,7 +11,7 @@ from clearway.experiments.other_learners import other_learners
 from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
-from clearway.experiments.setting import REWARDS, Setting
+from clearway.experiments.setting import TABLE_1_REWARDS, Setting
 from clearway.experiments.trajectories import maps
 from clearway.experiments.verdicts import judged_less, judged_no_more, with_failures
 from clearway.learn.settings import with_settings
@@ -54,7 +54,7 @@ def all_groups(setting: Setting) -> list[Group]:
         for name, learner in setting.learners.items()
         if learner.clip_rewards
     }
-    return compared(setting, REWARDS) + compared(replace(setting, learners=unclipped), PAIR)
+    return compared(setting, TABLE_1_REWARDS) + compared(replace(setting, learners=unclipped), PAIR)
 
 
 def _tenth(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:

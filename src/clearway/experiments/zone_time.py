@@ -8,7 +8,7 @@ from clearway.experiments.groups import WALKED, Group, Scores, all_jobs, compare
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
-from clearway.experiments.setting import REWARDS, Setting
+from clearway.experiments.setting import TABLE_1_REWARDS, Setting
 from clearway.experiments.verdicts import further, judged_less, with_failures
 from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST
 
@@ -47,7 +47,7 @@ def section(setting: Setting) -> Section:
 
 
 def _groups(setting: Setting) -> list[Group]:
-    return compared(setting, REWARDS)
+    return compared(setting, TABLE_1_REWARDS)
 
 
 def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:

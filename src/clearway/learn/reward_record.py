@@ -39,10 +39,9 @@ def reward_from_json(content: Mapping[str, Any]) -> Reward:
     others = [
         UnknownTerm(path, tuple(sorted(own.items())), codes.get(path)) for path, own in content.get("terms", {}).items()
     ]
-    arrival = terms.pop(Arrival, None)
-    if arrival is None:
+    if Arrival not in terms:
         raise KeyError("terminal")
-    return Reward(name, (*in_order(terms), *others, arrival), clip)
+    return Reward(name, in_order(terms, others), clip)
 
 
 def _of_format_1(name: str, values: Mapping[str, float | None], clip: bool) -> Reward:

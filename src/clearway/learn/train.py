@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from clearway.children import children_import_program
 from clearway.choices import FeatureStore, TrackerName, ZoneLevel
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
@@ -103,9 +103,7 @@ class RunRequest:
         _ = self.paid
         if workers == 1:
             return
-        program = getattr(sys.modules["__main__"], "__file__", None)
-        main_too = ray is None and program is not None and Path(program).is_file()  # which workers here run
-        self.reward.check_sent(main_too)
+        self.reward.check_sent(main_too=ray is None and children_import_program())
         states = [scene.state_count for scene in self.scenes]
         check_scenes(len(states), workers)
         with faults_of(self.learner, "check_workers"):

@@ -61,8 +61,9 @@ class Reward:
         """Refuse what is no term.
 
         Raises:
-            RewardError: a term is none, a kind of term occurs twice, they stand in another order, or there is no
-                `Arrival`.
+            RewardError: the name, the switch or the terms are of the wrong kind; a term is none, keeps what is no
+                field, or has a parameter that is not finite or may change; a kind of term occurs twice, they stand in
+                another order, or there is not one `Arrival`.
         """
         if not isinstance(self.name, str) or not isinstance(self.clip, bool):
             raise RewardError(f"reward: name={self.name!r:.40}, clip={self.clip!r:.40}: expected a text, True or False")
@@ -74,6 +75,12 @@ class Reward:
             if "__dataclass_params__" not in vars(type(term)) and set(vars(term)) - {own.name for own in fields(term)}:
                 problem = f"the term {type(term).__name__} keeps what is no field of it, so that no record holds it"
                 raise RewardError(f"reward {self.name}: {problem}. Decorate it with @dataclass(frozen=True)")
+            for own in () if isinstance(term, UnknownTerm) else fields(term):
+                try:
+                    hash(value := getattr(term, own.name))
+                except TypeError as fault:
+                    problem = f"{own.name} of the term {type(term).__name__} is {value!r:.40}, which may change"
+                    raise RewardError(f"reward {self.name}: {problem}. Give a number, a text or a tuple") from fault
         kinds = [type(term) for term in self.terms if not isinstance(term, UnknownTerm)]
         paths = [_path(term) for term in self._others()]
         if len(set(kinds)) < len(kinds) or len(set(paths)) < len(paths):
@@ -83,8 +90,8 @@ class Reward:
         if places != sorted(places):
             order = ", ".join(kind.__name__ for kind in ours if kind is not Arrival)
             raise RewardError(f"reward {self.name}: terms stand in another order. Give {order}, then those of your own")
-        if sum(isinstance(term, Arrival) for term in self.terms) != 1:
-            raise RewardError(f"reward {self.name}: expected one term Arrival, for the target. Give one")
+        if [type(term) for term in self.terms if isinstance(term, Arrival)] != [Arrival]:
+            raise RewardError(f"reward {self.name}: expected one term Arrival itself, for the target. Give one")
         for name, value in self.parameters.items():
             if not _is_number(value):
                 raise RewardError(f"reward {self.name}: {name} is {value!r:.40}, expected a finite number. Correct it")
@@ -129,8 +136,10 @@ class Reward:
         """What a term gives, checked; one that is not ours may raise anything."""
         if type(term) in TERMS.values() or isinstance(term, UnknownTerm):
             return self._checked(term, term(before, moves), before.shape)
+        import numpy as np
+
         try:
-            earned = term(before, moves)
+            earned = np.asarray(term(before, moves))
         except (Exception, SystemExit) as fault:
             reason = kind_and_reason(fault)
             kind = type(term).__name__
@@ -158,7 +167,7 @@ class Reward:
             RewardError: there is no such parameter, or it is no finite number.
         """
         changes = {name: value for name, value in parameters.items() if value is not None}
-        terms: dict[type[Term], Term] = {type(term): term for term in self.terms}
+        ours = {type(term): term for term in self.terms if type(term) in TERMS.values()}
         for name, value in changes.items():
             if name not in TERM_OF:
                 raise RewardError(
@@ -167,8 +176,8 @@ class Reward:
             if not _is_number(value):
                 raise RewardError(f"--{name.replace('_', '-')} is {value!r}, expected a finite number. Correct it")
             kind = TERM_OF[name]
-            terms[kind] = replace(terms.get(kind, kind()), **{name: float(value)})
-        changed = Reward(self.name, in_order(terms), self.clip if clip is None else clip)
+            ours[kind] = replace(ours.get(kind, kind()), **{name: float(value)})
+        changed = Reward(self.name, in_order(ours, self._others()), self.clip if clip is None else clip)
         base, before = self._told_by_name()
         known, now = REWARDS.get(base, self).parameters, changed.parameters
         told = {} if base in REWARDS else before

@@ -6,7 +6,7 @@ A term takes what the terms before it let every action of every pose earn, (S, A
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -163,8 +163,7 @@ class UnknownTerm(Term):
         raise RewardError(f"the reward has the term {self.path}, which is not loaded. Name the reward itself")
 
 
-def in_order(terms: Mapping[type[Term], Term]) -> tuple[Term, ...]:
+def in_order(ours: Mapping[type[Term], Term], others: Iterable[Term]) -> tuple[Term, ...]:
     """Ours as in `TERMS`, others before `Arrival`."""
-    ours = [terms[kind] for kind in TERMS.values() if kind in terms and kind is not Arrival]
-    others = [term for kind, term in terms.items() if kind not in TERMS.values()]
-    return (*ours, *others, *(term for kind, term in terms.items() if kind is Arrival))
+    before = [ours[kind] for kind in TERMS.values() if kind in ours and kind is not Arrival]
+    return (*before, *others, *(term for kind, term in ours.items() if kind is Arrival))

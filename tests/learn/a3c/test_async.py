@@ -7,17 +7,19 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from clearway.errors import RunError
 from clearway.learn import running, statistics, train
+from clearway.learn.a3c import parent
 from clearway.learn.a3c.parent import AsyncTrainer
-from clearway.learn.a3c.process import world_tensors
+from clearway.learn.a3c.process import WorkerReport, world_tensors
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
 from clearway.learn.figures import Figures
@@ -27,7 +29,7 @@ from clearway.learn.presets import PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
 from clearway.learn.train import RunRequest
-from clearway.reward import COLLISION_AWARE
+from clearway.reward import COLLISION_AWARE, Arrival, Reward, RewardError, Term
 from helpers.agents import told_after
 from helpers.plain_a3c import PlainA3C
 from helpers.small_runs import equal_bits, small_learner, small_network, small_request, small_world
@@ -42,6 +44,20 @@ def a3c_request(frames: int) -> RunRequest:
 def async_trainer(frames: int, processes: int) -> AsyncTrainer:
     request = a3c_request(frames)
     return AsyncTrainer(small_world(), request.learner, request.paid, 3, processes)
+
+
+def test_a_term_that_its_processes_cannot_import_is_refused() -> None:
+    @dataclass(frozen=True)
+    class Inner(Term):
+        pass
+
+    with pytest.raises(RewardError, match="its term Inner stands inside a function, which worker processes cannot"):
+        AsyncTrainer(small_world(), a3c_request(1000).learner, Reward("inner", (Inner(), Arrival())), 3)
+
+
+def test_figures_are_means_over_updates() -> None:
+    reports = [WorkerReport(15, 3, np.zeros(0), {"loss": 1.0}), WorkerReport(5, 1, np.zeros(0), {"loss": 5.0})]
+    assert parent._mean(reports) == {"loss": 2.0}
 
 
 def children_of(process: int) -> list[int]:

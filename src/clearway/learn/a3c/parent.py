@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection, wait
 import torch
 from torch import Tensor
 
-from clearway.children import ChildProcess, check_program, signals_held
+from clearway.children import ChildProcess, check_program, children_import_program, signals_held
 from clearway.errors import RunError
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import WorkerGroup
@@ -48,7 +48,9 @@ class AsyncTrainer:
         processes: at most this many; workers are dealt out evenly.
 
     Raises:
-        RunError: features are missing or not finite, there are fewer workers than targets, or no memory is left.
+        RunError: the world is not on the processor, features are missing or not finite, there are fewer workers than
+            targets, or no memory is left.
+        RewardError: processes cannot import a term of the reward.
     """
 
     def __init__(self, world: World, learner: A3C, reward: Reward, seed: int, processes: int = 1) -> None:
@@ -58,6 +60,7 @@ class AsyncTrainer:
             raise RunError(
                 f"{learner.envs} workers for {world.target_count} targets. Give --set envs={world.target_count} or more"
             )
+        reward.check_sent(main_too=children_import_program())
         self.world, self.learner, self.reward, self.seed = world, learner, reward, seed
         self.frames, self.updates = 0, 0
         self.feature_map, features = network_input(world, learner)
@@ -67,7 +70,7 @@ class AsyncTrainer:
         self._processes: list[ChildProcess] = []
         self._connections: list[Connection] = []
         self._paused = False
-        self._figures: list[Figures] = []
+        self._reports: list[WorkerReport] = []
 
     def _new_shared(self, features: Tensor) -> SharedTensors:
         """Shared memory with everything at its start; features (S, F) as the network takes them."""
@@ -114,7 +117,7 @@ class AsyncTrainer:
             for message in self._messages():
                 assert isinstance(message, WorkerReport)
                 self._add(message)
-        result, self._figures = _mean(self._figures), []
+        result, self._reports = _mean(self._reports), []
         return result
 
     def tensors(self) -> dict[str, Tensor]:
@@ -235,7 +238,7 @@ class AsyncTrainer:
         self.statistics.totals += totals
         self.statistics.window += totals[:, : self.statistics.window.shape[1]]
         self.statistics.refresh_success()
-        self._figures.append(report.figures)
+        self._reports.append(report)
         check_finite(report.figures, self.frames)
 
 
@@ -244,5 +247,7 @@ def _by_target(workers: int, targets: int) -> Tensor:
     return torch.argsort(torch.arange(workers) % targets, stable=True)
 
 
-def _mean(figures: list[Figures]) -> Figures:
-    return {name: sum(each[name] for each in figures) / len(figures) for name in figures[0]}
+def _mean(reports: list[WorkerReport]) -> Figures:
+    """Means of figures over all updates of the reports."""
+    updates = sum(report.updates for report in reports)
+    return {name: sum(each.figures[name] * each.updates for each in reports) / updates for name in reports[0].figures}
