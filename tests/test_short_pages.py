@@ -66,7 +66,8 @@ def test_results_have_the_bathrooms_claims() -> None:
 
 def test_results_have_the_rooms_claims() -> None:
     own, other, settles = sentence(
-        r"`collision-aware` has ([\d.]+ \([\d.-]+\)) collisions, `shortest` ([\d.]+ \([\d.-]+\)): fewer in every room, in no more steps. "
+        r"`collision-aware` has ([\d.]+ \([\d.-]+\)) collisions, `shortest` ([\d.]+ \([\d.-]+\)): "
+        r"fewer in every room, in no more steps. "
         r"Whether it settles sooner \(in (\w+) it does\) is undecided",
         RESULTS,
     )

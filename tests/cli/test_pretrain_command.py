@@ -53,3 +53,10 @@ def test_views_without_depth_are_refused(clearway, tmp_path):
     write_made(tmp_path, "room", ViewSettings(poses=2, takes=2))
     answer = clearway("pretrain", tmp_path / "room.h5", "--out", tmp_path / "eyes")
     assert answer.refusal("rgb 96 x 128", "Take them with --sensors rgb depth")
+
+
+def test_views_to_try_eyes_on_are_looked_at_before_any_are_trained(clearway, tmp_path, views):
+    write_made(tmp_path, "room", ViewSettings(poses=2, takes=2))
+    answer = clearway("pretrain", views, "--out", tmp_path / "eyes", "--try-on", tmp_path / "room.h5")
+    assert answer.refusal("--try-on rgb 96 x 128", "Take them with --sensors rgb depth")
+    assert not (tmp_path / "eyes").exists()

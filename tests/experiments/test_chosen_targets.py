@@ -11,7 +11,7 @@ from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.errors import SceneError
 from clearway.evaluation.episodes import run_episodes
 from clearway.experiments import fig5, fig6, hard_tables
-from clearway.experiments.groups import PAIR, all_jobs, compared
+from clearway.experiments.groups import PAIR, Scores, all_jobs, compared, of_same_seeds
 from clearway.experiments.hard_targets import hard_targets, hardness
 from clearway.experiments.section import Claim
 from clearway.scenes.actions import BLOCKED, Action
@@ -47,9 +47,9 @@ def test_hard_targets_lie_apart_and_lead_the_ranking() -> None:
 
 def least_apart(scene: Scene, targets: tuple[int, ...]) -> int:
     """Cells between the two that lie closest."""
-    cells = np.rint(scene.locations_m[list(targets)] / scene.cell_size_m)
-    apart = np.abs(cells[:, None] - cells[None]).max(-1)
-    return int(apart[~np.eye(len(targets), dtype=bool)].min())
+    places = scene.locations_m[list(targets)]
+    apart = np.abs(places[:, None] - places[None]).max(-1) / scene.cell_size_m
+    return int(np.rint(apart[~np.eye(len(targets), dtype=bool)].min()))
 
 
 @pytest.mark.parametrize(("cells", "count", "apart"), [(3, 5, 0), (3, 3, 1), (5, 3, 2), (9, 3, 4)])
@@ -58,6 +58,13 @@ def test_where_too_few_lie_apart_they_stand_as_far_as_they_can(cells: int, count
     chosen = hard_targets(scene, count)
     assert len(set(chosen.targets)) == count
     assert chosen.apart_cells == apart == least_apart(scene, chosen.targets)
+
+
+def test_cells_may_lie_halfway_between_the_origin_s() -> None:
+    scene = corridor_scene(9)
+    halfway = replace(scene, locations_m=scene.locations_m + scene.cell_size_m / 2)
+    assert hard_targets(halfway, 3) == hard_targets(scene, 3)
+    assert least_apart(halfway, hard_targets(halfway, 3).targets) == 4
 
 
 def test_hard_targets_lie_where_ways_lead() -> None:
@@ -77,6 +84,13 @@ def test_hard_targets_leave_out_what_is_held_out() -> None:
     chosen = hard_targets(generated, scene.state_count // 4, apart_cells=0)
     assert not generated.held_out[list(chosen.targets)].any()
     assert max(chosen.rank) == len(chosen.targets)  # among those that may be targets
+
+
+def test_seeds_that_one_reward_lacks_do_not_count_for_the_other() -> None:
+    shortest, aware = Scores((5, 6, 7), np.arange(3.0).reshape(3, 1, 1)), Scores((7, 5), np.array([[[70.0]], [[50.0]]]))
+    first, second = of_same_seeds([shortest, aware])
+    assert first.seeds == second.seeds == (5, 7)
+    assert (first.values.ravel().tolist(), second.values.ravel().tolist()) == ([0, 2], [50, 70])
 
 
 def test_hard_targets_are_written_once_and_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,7 +170,7 @@ def test_whether_hard_targets_are_harder_is_open_until_the_usual_ones_are_there(
     tmp_path: Path, table: hard_tables.HardTable
 ) -> None:
     """It counts as a claim before (Holm): else verdicts would be taken back when they come."""
-    setting = small_setting(tmp_path)
+    setting = small_setting(tmp_path, seeds=4)
     setting = replace(setting, learners={"paper": setting.learners["paper"]})
 
     def claim() -> Claim:
@@ -166,4 +180,4 @@ def test_whether_hard_targets_are_harder_is_open_until_the_usual_ones_are_there(
     do_here(setting.out, all_jobs(table._groups(setting)), threads=1)
     assert (claim().verdict, claim().evidence) == ("undecided", hard_tables.NO_EASY)
     do_here(setting.out, all_jobs(compared(setting, PAIR)), threads=1)
-    assert claim().p is not None and claim().evidence != hard_tables.NO_EASY
+    assert claim().p is not None and "; 4 and 4 seeds of 2 rewards each." in claim().evidence

@@ -53,6 +53,16 @@ def test_more_is_fewer_the_other_way_round() -> None:
     assert judged_more("more", "sc", scores(1), scores(2), SCENE).verdict == "undecided"
 
 
+def test_runs_of_two_rewards_are_not_seeds_twice() -> None:
+    low, high = scores(1, 1.1, 0.9, 1.2, 1, 0.9), scores(2, 2.1, 1.9, 2.2, 2, 1.9)
+    assert judged_more("more", "sc", high, low, SCENE).verdict == "holds"
+    claim = judged_more("more", "sc", high, low, SCENE, rewards=2)
+    assert (claim.verdict, claim.p) == ("undecided", None)
+    assert "; 3 and 3 seeds of 2 rewards each. Fewer than 4 seeds decide nothing." in claim.evidence
+    low, high = (np.concatenate([each, each[:2]]) for each in (low, high))
+    assert judged_no_more("no more", "steps", low, high, SCENE, rewards=2).verdict == "holds"
+
+
 def test_failed_targets_are_told_beside_the_means() -> None:
     claim = judged_less("fewer", "steps", scores(1, 1, 1, 1), scores(2, 2, 2, 2), SCENE)
     success = np.ones((4, 2))

@@ -239,6 +239,7 @@ def test_render_shows_view_and_target(make: Make) -> None:
         ({"success_deg": None}, "success_deg=None: expected a number"),
         ({"targets": [1000]}, "targets: 1000 is not among"),
         ({"targets": "all"}, "targets='all': expected state ids"),
+        ({"targets": [[1], [1, 2]]}, r"targets=[[1], [1, 2]]: expected state ids"),
         ({"history_length": 0}, "history_length=0: expected at least 1"),
         ({"render_mode": "human"}, "render_mode='human' is unknown"),
         ({"render_mode": "rgb_array", "sensors": ("depth",)}, "shows colour pictures"),

@@ -115,6 +115,13 @@ def test_one_sensor_alone_can_be_read(views, monkeypatch) -> None:
     assert depth.dtype == np.float32 and depth.min() >= 0 and depth.max() <= 20
 
 
+def test_poses_that_are_too_few_for_a_block_go_with_the_one_before(views, monkeypatch) -> None:
+    monkeypatch.setattr(stream, "BLOCK_POSES", 4)  # of ten poses four, and six, of which every epoch three come twice
+    seen = {row for epoch in range(20) for row in flat(views.batches(6, epoch=epoch, together=3))}
+    assert seen == set(EVERY)
+    assert views.batch_count(6, together=3) == 3 * 3
+
+
 def test_blocks_of_large_pictures_are_smaller(views, monkeypatch) -> None:
     pose_bytes = 2 * (16 * 16 * 3 + 16 * 16 * 2)
     monkeypatch.setattr(stream, "BLOCK_BYTES", 2 * pose_bytes + 1)

@@ -65,7 +65,7 @@ def pretrain(
     from clearway.pretraining.judge import judge
     from clearway.pretraining.pretrain import pretrain as train_eyes
     from clearway.pretraining.settings import PretrainSettings
-    from clearway.pretraining.trainer import PretrainRequest
+    from clearway.pretraining.trainer import PretrainRequest, check_views
     from clearway.pretraining.workers import pretrain_by_workers
     from clearway.progress import work_progress
     from clearway.torch_threads import torch_threads
@@ -79,6 +79,8 @@ def pretrain(
     tried = views_in(as_paths("try_on", try_on)) if try_on else None
     shown = views_in(as_paths("views", views))
     request = PretrainRequest(shown, settings, as_whole("seed", seed, 0, MAX_SEED), kept, as_word("device", device))
+    if tried is not None:
+        check_views("try_on", tried, shape)
     folder = as_path("out", out)
     if processes > 1:
         pretrain_by_workers(

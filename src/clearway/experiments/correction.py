@@ -2,8 +2,9 @@
 
 Of twenty claims that say nothing one is told by chance at 5 %. Holm's rule holds that chance at 5 % for all claims of
 a section about one learner together: of m claims the i-th smallest p, times m + 1 - i, is to be 5 % at most, and so
-are all before it. Claims that name no learner before a colon are together, too. Claims whose runs are not there yet
-count, so that no verdict is taken back when they come.
+are all before it. The learner is what stands before a colon; who writes more there, as `off-grid` does, has families of
+its own. Claims that name none are together, too. Claims whose runs are not there yet count, so that no verdict is taken
+back when they come.
 """
 
 from __future__ import annotations

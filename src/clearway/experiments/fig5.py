@@ -17,7 +17,7 @@ from clearway.experiments.generalisation import (
     told_of_own_goals,
     tried,
 )
-from clearway.experiments.groups import PAIR, WALKED, Group, Scores, all_jobs, random_walk
+from clearway.experiments.groups import PAIR, WALKED, Group, Scores, all_jobs, of_same_seeds, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC, reminder
 from clearway.experiments.plan import RANDOM_WALK, Job, TargetSets
@@ -126,10 +126,12 @@ def _falls(setting: Setting, kinds: Mapping[Kind, list[Tried]]) -> Iterator[Clai
         ends = []
         for place in (0, -1):
             own = [kinds[learner, reward.name][place] for reward in PAIR]
-            ends.append(np.concatenate([each.scores.in_scenes("sc", each.target_scene) for each in own]))
+            found = of_same_seeds([each.scores for each in own])
+            scenes = [each.target_scene for each in own]
+            ends.append(np.concatenate([each.in_scenes("sc", of) for each, of in zip(found, scenes, strict=True)]))
         text = f"{learner}: success falls with distance (higher sc {DISTANCES[0]} step away than {DISTANCES[-1]})"
         near, far = ends
-        yield judged_more(text, "sc", near, far, np.arange(len(setting.scenes)))
+        yield judged_more(text, "sc", near, far, np.arange(len(setting.scenes)), rewards=len(PAIR))
 
 
 def _groups(setting: Setting, steps: int) -> list[Group]:

@@ -98,6 +98,12 @@ class Scores:
         return [value for each in found for value in (each.value, each.ends)]
 
 
+def of_same_seeds(each: Sequence[Scores]) -> list[Scores]:
+    """Of each the seeds that all have, in one order."""
+    seeds = [seed for seed in each[0].seeds if all(seed in other.seeds for other in each)]
+    return [Scores(tuple(seeds), one.values[[one.seeds.index(seed) for seed in seeds]]) for one in each]
+
+
 def scores(tables: Mapping[int, EpisodeTable], target_count: int) -> Scores:
     """The figures of tables by seed, all over the same targets."""
     values = [by_target(table, target_count) for table in tables.values()]

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from clearway.experiments.convergence import settling
-from clearway.experiments.groups import PAIR, Group, all_jobs, compared
+from clearway.experiments.groups import PAIR, Group, all_jobs, compared, of_same_seeds
 from clearway.experiments.hard_targets import hard_targets
 from clearway.experiments.kept import keep, kept
 from clearway.experiments.navigation_tables import navigation_tables
@@ -79,10 +79,10 @@ class HardTable:
             easy, hard = _detours(setting, main, learner, world), _detours(setting, groups, learner, hard_world)
             if self.frames_factor == 1:
                 text = f"{learner}: hard targets are harder (larger detours)"
-                claim = judged_more(text, "x shortest paths", hard, easy, scenes)
+                claim = judged_more(text, "x shortest paths", hard, easy, scenes, rewards=len(PAIR))
             else:
                 text = f"{learner}: {self.frames_factor} times the frames repair hard targets (no larger detours)"
-                claim = judged_no_more(text, "x shortest paths", hard, easy, scenes)
+                claim = judged_no_more(text, "x shortest paths", hard, easy, scenes, rewards=len(PAIR))
             yield claim if len(easy) else replace(claim, evidence=NO_EASY)
 
     def _groups(self, setting: Setting) -> list[Group]:
@@ -90,9 +90,9 @@ class HardTable:
 
 
 def _detours(setting: Setting, groups: Sequence[Group], learner: str, world: World) -> np.ndarray:
-    """(R, C) steps over the shortest paths' in each scene: a learner's complete runs under the paper's two rewards."""
+    """(R, C) steps over the shortest paths' in each scene: a learner's runs of seeds complete under both rewards."""
     own = [group for group in groups if group.learner == learner and group.runs[0].reward in PAIR]
-    found = [group.scores(setting.out, world.target_count) for group in own]
+    found = of_same_seeds([group.scores(setting.out, world.target_count) for group in own])
     return np.concatenate([each.detours(world.target_scene.numpy()) for each in found])
 
 

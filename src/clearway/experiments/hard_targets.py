@@ -69,7 +69,7 @@ def hard_targets(scene: Scene, count: int = TARGETS_PER_SCENE, apart_cells: int 
     values = hardness(scene)
     order = np.argsort(-values, kind="stable")
     order = order[np.isin(order, possible_targets(scene))]  # from elsewhere no way leads there; others are held out
-    cells = np.rint(scene.locations_m / scene.cell_size_m).astype(np.int64)
+    cells = np.rint((scene.locations_m - scene.locations_m[0]) / scene.cell_size_m).astype(np.int64)  # from any of them
     taken: list[int] = []
     apart = apart_cells
     for apart in range(apart_cells, -1, -1):

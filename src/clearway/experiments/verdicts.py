@@ -46,15 +46,22 @@ def judged_less(text: str, what: str, first: np.ndarray, second: np.ndarray, tar
     return _judged(text, what, first, second, target_scene)
 
 
-def judged_more(text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray) -> Claim:
-    """The claim that the first kind of agent has more of something than the second; as in `judged_less`."""
-    return _judged(text, what, first, second, target_scene, more=True)
+def judged_more(
+    text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray, *, rewards: int = 1
+) -> Claim:
+    """The claim that the first kind of agent has more of something than the second.
+
+    As in `judged_less`; `rewards`: so many whose runs stand together on either side, of the same seeds.
+    """
+    return _judged(text, what, first, second, target_scene, more=True, rewards=rewards)
 
 
-def judged_no_more(text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray) -> Claim:
-    """The claim that the first kind has no more of something: at most 2 % more than the second."""
+def judged_no_more(
+    text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray, *, rewards: int = 1
+) -> Claim:
+    """The claim that the first kind has no more of something: at most 2 % more than the second; as in `judged_more`."""
     allowed = SAME * mean_estimate(second, target_scene).value if len(second) else 0.0
-    return _judged(text, what, first, second, target_scene, allowed=allowed)
+    return _judged(text, what, first, second, target_scene, allowed=allowed, rewards=rewards)
 
 
 def with_failures(
@@ -94,6 +101,7 @@ def _judged(
     *,
     more: bool = False,
     allowed: float = 0.0,
+    rewards: int = 1,
 ) -> Claim:
     if not len(first) or not len(second):
         return Claim(text, "undecided", "No complete runs.")
@@ -105,11 +113,13 @@ def _judged(
         "difference": found,
         "probability of improvement": probability_of_less(*pair, target_scene),
     }
+    seeds = [len(each) // rewards for each in (first, second)]
     evidence = (
         f"{what}: {numbers['first']} against {numbers['second']}, difference {found}; probability of improvement, mean "
-        f"over targets: {numbers['probability of improvement']}; {len(first)} and {len(second)} seeds."
+        f"over targets: {numbers['probability of improvement']}; {seeds[0]} and {seeds[1]} seeds"
+        f"{'.' if rewards == 1 else f' of {rewards} rewards each.'}"
     )
-    if min(len(first), len(second)) < LEAST_RUNS:
+    if min(seeds) < LEAST_RUNS:
         return Claim(text, "undecided", f"{evidence} {TOO_FEW}", numbers)
     p = permutation_p(first, second, target_scene, allowed)
     return Claim(text, side(-found if more else found, allowed), evidence, numbers, p=p)

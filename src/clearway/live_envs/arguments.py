@@ -172,7 +172,10 @@ def checked_targets(targets: Sequence[int] | str | None) -> np.ndarray | None:
     """State ids, (T,) int64, or None as it is; EnvError where they are none."""
     if targets is None:
         return None
-    found = np.asarray(targets)
+    try:
+        found = np.asarray(targets)
+    except ValueError:  # lists of several lengths
+        found = np.empty(0)
     if found.ndim != 1 or not len(found) or not np.issubdtype(found.dtype, np.integer):
         raise EnvError(f"targets={targets!r:.80}: expected state ids, such as [26, 37]")
     return found.astype(np.int64)

@@ -257,7 +257,8 @@ class Episodes:
         self._measuring.stand_at(np.array(pose[:2]))
         if not self.live.is_on_floor(*pose[:2]) or self._measuring.touches:
             place = f"({end[0]:g}, {end[1]:g})"
-            raise EnvError(f"options['{name}']: the body does not fit at {place} in {self.live.scene.name}")
+            problem = f"the body does not fit at {place} in {self.live.scene.name}"
+            raise EnvError(f"options['{name}']: {problem}. Give a place that is free, or a state of the scene")
         return pose
 
     def _drawn(self, name: str, states: np.ndarray, other: Pose | None, chance: float) -> Pose:

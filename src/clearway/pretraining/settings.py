@@ -50,6 +50,9 @@ class PretrainSettings:
         for name, value in (("learning_rate", self.learning_rate), ("gradient_norm", self.gradient_norm)):
             if not 0 < value <= 10:
                 raise ArgumentError(f"{name}={value:g}: expected a number above 0, at most 10. Give one in that range")
+        if not 0 <= self.weight_decay <= 10:
+            problem = f"weight_decay={self.weight_decay:g}: expected a number from 0 to 10"
+            raise ArgumentError(f"{problem}. Give one in that range")
 
     @property
     def updates(self) -> int:

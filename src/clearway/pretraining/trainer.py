@@ -18,7 +18,7 @@ from clearway.learn.optimiser import clip_gradients
 from clearway.learn.peers import ALONE, Peers
 from clearway.model.precision import multiplies_bfloat16
 from clearway.perception.eyes import EyesEncoder
-from clearway.perception.eyes_network import Eyes
+from clearway.perception.eyes_network import Eyes, EyesShape
 from clearway.pretraining.ahead import made_ahead
 from clearway.pretraining.augment import chances, relit, standardised
 from clearway.pretraining.labels import pair_labels
@@ -55,15 +55,7 @@ class PretrainRequest:
 
     def __post_init__(self) -> None:
         self.settings.check()
-        sensors = {sensor.name: sensor.shape[:2] for sensor in self.views.sensors}
-        shape = self.settings.shape
-        size = (shape.height_px, shape.width_px)
-        if sensors.get(RGB) != size or sensors.get(DEPTH) != size:
-            seen = ", ".join(f"{name} {rows} x {columns}" for name, (rows, columns) in sensors.items())
-            wanted = f"rgb and depth of {size[0]} x {size[1]}"
-            raise ArgumentError(f"views={seen}: expected {wanted}. Take them with --sensors rgb depth")
-        if self.views.takes != 2:
-            raise ArgumentError(f"views={self.views.takes} takes of each pose: expected 2. Take them with --takes 2")
+        check_views("views", self.views, self.settings.shape)
         if not self.batches_an_epoch:
             problem = f"views={len(self.views)} pictures: fewer than one batch of {self.settings.batch}"
             raise ArgumentError(f"{problem}. Take more: clearway scenes views with more scenes, or more --poses")
@@ -75,6 +67,18 @@ class PretrainRequest:
         count = self.views.batch_count(settings.batch, settings.together)
         poses = sum(len(shard) // 2 // settings.together * settings.together for shard in self.views.shards)
         return count if poses * 2 == count * settings.batch else count - 1
+
+
+def check_views(name: str, views: Views, shape: EyesShape) -> None:
+    """Raise ArgumentError where views, an argument of that name, are none to teach eyes of a shape, or try them, on."""
+    sensors = {sensor.name: sensor.shape[:2] for sensor in views.sensors}
+    size = (shape.height_px, shape.width_px)
+    if sensors.get(RGB) != size or sensors.get(DEPTH) != size:
+        seen = ", ".join(f"{sensor} {rows} x {columns}" for sensor, (rows, columns) in sensors.items())
+        wanted = f"rgb and depth of {size[0]} x {size[1]}"
+        raise ArgumentError(f"{name}={seen}: expected {wanted}. Take them with --sensors rgb depth")
+    if views.takes != 2:
+        raise ArgumentError(f"{name}={views.takes} takes of each pose: expected 2. Take them with --takes 2")
 
 
 class Pretrainer:

@@ -160,11 +160,13 @@ class Views:
         """All blocks, room after room."""
         pose_bytes = self.takes * sum(sensor.kept_bytes for sensor in self.sensors)
         poses = together * max(1, min(BLOCK_POSES, BLOCK_BYTES // pose_bytes) // together)
-        return [
-            _Block(room, first, min(poses, len(shard) // self.takes - first))
-            for room, shard in enumerate(self.shards)
-            for first in range(0, len(shard) // self.takes, poses)
-        ]
+        found = []
+        for room, shard in enumerate(self.shards):
+            count = len(shard) // self.takes
+            firsts = range(0, count - together + 1, poses)  # a rest of fewer than `together` goes with the last block
+            ends = [*firsts[1:], count]
+            found += [_Block(room, first, end - first) for first, end in zip(firsts, ends, strict=True)]
+        return found
 
     def _stream(
         self,
