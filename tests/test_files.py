@@ -50,6 +50,19 @@ def test_what_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None
     assert names(tmp_path) == ["a.txt"]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="permissions are the system's own")
+def test_a_file_keeps_its_permissions_and_a_new_one_has_the_usual(tmp_path: Path) -> None:
+    path, before = tmp_path / "private.txt", os.umask(0o027)
+    try:
+        for mode in (0o640, 0o600):
+            with written_whole(path) as part:
+                part.write_text("mine")
+            assert path.stat().st_mode & 0o777 == mode
+            path.chmod(0o600)
+    finally:
+        assert os.umask(before) == 0o027
+
+
 def test_unfinished_files_of_killed_processes_go_and_those_of_living_ones_stay(tmp_path: Path) -> None:
     killed, living = writer(tmp_path / "a.txt"), writer(tmp_path / "b.txt")
     assert len(names(tmp_path)) == 2

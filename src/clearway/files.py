@@ -9,11 +9,13 @@ import os
 import platform
 import re
 import shutil
+import stat
 import tempfile
+import threading
 import warnings
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,6 +27,7 @@ CACHE_VARIABLE = "CLEARWAY_CACHE"
 PART_NAME = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)-\w+\.part")
 MAX_JSON_BYTES = 64 * 1024**2
 TOLD_AFTER_S = 5.0  # of waiting for another process
+_UMASK = threading.Lock()
 
 
 class WaitsWarning(UserWarning):
@@ -37,7 +40,7 @@ def written_whole(path: Path) -> Iterator[Path]:
 
     The file reaches the disk (fsync) before it is renamed, so that a crash leaves the old file or the new one. What
     processes that were killed left unfinished in the folder is removed. Where `path` is a link, the file that it leads
-    to is written.
+    to is written. One that is there keeps its permissions.
 
     Raises:
         OSError: the file cannot be written, and its name is that of `path`; IsADirectoryError where `path` is a folder.
@@ -57,7 +60,7 @@ def written_whole(path: Path) -> Iterator[Path]:
             yield part
             with part.open("rb+") as file:
                 os.fsync(file.fileno())
-            part.chmod(0o666 & ~_umask())
+            part.chmod(stat.S_IMODE(final.stat().st_mode) if final.exists() else 0o666 & ~_umask())
             part.replace(final)
     finally:
         part.unlink(missing_ok=True)
@@ -134,7 +137,11 @@ def _remove_leftovers(folder: Path) -> None:
 
 
 def _host() -> str:
-    return f"{zlib.crc32(platform.node().encode()):08x}"
+    """Of this machine, or container: where numbers of processes mean the same."""
+    numbers = ""
+    with suppress(OSError):
+        numbers = os.readlink("/proc/self/ns/pid")
+    return f"{zlib.crc32((platform.node() + numbers).encode()):08x}"
 
 
 def _is_alive(process: int) -> bool:
@@ -150,8 +157,13 @@ def _is_alive(process: int) -> bool:
 
 
 def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
+    with suppress(OSError):
+        told = re.search(r"^Umask:\s*([0-7]+)$", Path("/proc/self/status").read_text(encoding="utf-8"), re.MULTILINE)
+        if told:
+            return int(told[1], 8)
+    with _UMASK:  # others make files while it is set: there is no other way to read it here
+        mask = os.umask(0o077)
+        os.umask(mask)
     return mask
 
 

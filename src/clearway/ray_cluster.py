@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from clearway.errors import RunError, install_hint
+from clearway.errors import ArgumentError, RunError, install_hint
 
 LOCAL = "local"
 PATIENCE_S = 10.0  # for a cluster's address to answer; Ray by itself tries for many minutes
@@ -23,8 +23,11 @@ def connected(address: str, cores: int | None = None) -> Iterator[Any]:
         cores: processors that Ray may use under "local"; None: all.
 
     Raises:
+        ArgumentError: the address is no text.
         RunError: Ray is not installed, or the cluster cannot be reached.
     """
+    if not isinstance(address, str):
+        raise ArgumentError(f"ray={address!r:.80}: expected local, auto or a cluster's address. Give one of them")
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     os.environ.setdefault("RAY_AUTH_MODE", "token")
     try:

@@ -38,6 +38,11 @@ def test_pictures_of_a_file(tmp_path) -> None:
         ({"autoreset_mode": "SameStep"}, "no such option"),
         ({"num_envs": 0}, "num_envs=0: expected a whole number from 1 on"),
         ({"num_envs": "3"}, "num_envs='3': expected a whole number"),
+        ({"max_episode_steps": 0}, "max_episode_steps=0: expected a whole number from 1 on"),
+        ({"max_episode_steps": "5"}, "max_episode_steps='5': expected a whole number"),
+        ({"render_mode": 5}, "render_mode=5: expected a word"),
+        ({"sensors": 5}, "sensors=5: expected names"),
+        ({"sensors": [["rgb"]]}, "expected names"),
         ({"reward": ["shortest"]}, r"reward=\['shortest'\] is unknown"),
     ],
 )

@@ -137,6 +137,8 @@ def test_what_an_agent_raises_and_a_state_without_rows_are_told_in_one_line(scen
 
     with pytest.raises(AgentError, match=r"Failing: agent: failed .KeyError: 'a map'."):
         clearway.evaluate(Failing, scene, **SHORT)
+    with pytest.raises(AgentError, match=r"Failing: agent: failed .KeyError: 'a map'."):
+        clearway.evaluate(Failing(make_world([scene], {scene.name: [5]})), scene, targets=[5], **SHORT)
     with pytest.raises(
         AgentError, match=r"Forgetful: the agent's state has 'turns' of shape .3,., expected .10, \.\.\.."
     ):

@@ -9,7 +9,7 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
-from clearway.deploy import onnx_file
+from clearway.deploy import onnx_file, onnx_graph_check
 from clearway.deploy.onnx_file import CHECKSUM_KEY, NO_DIGEST, read_onnx, sealed
 from clearway.deploy.onnx_graph_check import problem_of
 from clearway.errors import DeployError
@@ -100,6 +100,15 @@ def test_graphs_in_graphs_are_followed_only_so_deep() -> None:
 
     assert problem_of(nested(20)) is None
     assert problem_of(nested(2000)) == "graphs more than 32 deep"
+
+
+def test_fields_beyond_number_are_not_gone_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph = b"\x0a\x00" * 60  # nodes of nothing
+    whole = b"\x3a" + _length(len(graph)) + graph
+    monkeypatch.setattr(onnx_graph_check, "MOST_FIELDS", 61)
+    assert problem_of(whole) is None
+    monkeypatch.setattr(onnx_graph_check, "MOST_FIELDS", 60)
+    assert problem_of(whole) == "more than 60 parts"
 
 
 def _length(value: int) -> bytes:

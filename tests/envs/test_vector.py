@@ -287,6 +287,8 @@ def test_a_target_that_the_options_leave_open_is_drawn() -> None:
         ({"scene": "first", "target": 4}, "state 4 is not a target of first. Its targets: 3, 8"),
         ({"scene": "first", "target": 3.0}, "expected a state id"),
         ({"scene": "first", "start": 10_000}, "state 10000 is not in first. Its states are 0 to"),
+        ({"scene": "first", "start": 2**63}, r"options\['start'\]: expected a state id, .* got 9223372036854775808"),
+        ({"scene": "first", "target": [[1], [2, 3]]}, r"options\['target'\]: expected a state id"),
         ({"scene": "first", "start": -1}, "state -1 is not in first"),
         ({"scene": "first", "target": 3, "start": 3}, "state 3 as start reaches no .other. target of first"),
         ({"reset_mask": [True, False]}, r"expected a bool array of shape \(2,\)"),

@@ -1,7 +1,14 @@
 import numpy as np
 import pytest
 
-from clearway.evaluation.across_seeds import Estimate, _interval, difference, mean_estimate, probability_of_less
+from clearway.evaluation.across_seeds import (
+    Estimate,
+    _interval,
+    difference,
+    mean_estimate,
+    permutation_p,
+    probability_of_less,
+)
 
 SCENE = np.array([0, 0, 0, 1])  # three targets in one scene, one in another
 
@@ -53,6 +60,35 @@ def test_the_difference_is_signed() -> None:
     found = difference(first, second, SCENE)
     assert found.value == -1
     assert found.interval == (-1, -1)
+
+
+def unequal(place: int) -> np.ndarray:
+    """Five runs of five targets, of which one is not always arrived at."""
+    return np.where(np.arange(5) == place, 0.93, 1.0) * np.ones((5, 1))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "allowed"),
+    [
+        (unequal(4), unequal(0), 0.0),
+        (np.full((5, 25), 0.99), np.full((6, 25), 0.99), 0.0),
+        (np.full((6, 25), 0.99), np.full((8, 25), 0.99), 0.0),
+        (np.full((5, 4), 0.3), np.full((5, 4), 0.2), 0.1),
+        (np.zeros((5, 4)), np.zeros((5, 4)), 0.0),
+    ],
+)
+def test_what_rounding_leaves_is_no_difference(first: np.ndarray, second: np.ndarray, allowed: float) -> None:
+    scene = np.zeros(first.shape[1], int)
+    assert permutation_p(first, second, scene, allowed) == permutation_p(second + allowed, first, scene) == 1
+    found = difference(first, second, scene)
+    assert (found.value, *found.interval) == pytest.approx((allowed,) * 3, abs=1e-12)
+    assert allowed or (found.value, *found.interval) == (0, 0, 0)
+
+
+def test_small_differences_stay() -> None:
+    first, second = np.full((5, 4), 1e-9), np.full((5, 4), 2e-9)
+    assert permutation_p(first, second, SCENE) == pytest.approx(2 / 252)
+    assert difference(first, second, SCENE).interval == pytest.approx((-1e-9, -1e-9))
 
 
 def test_probability_of_less_by_hand() -> None:

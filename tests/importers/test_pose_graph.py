@@ -60,6 +60,13 @@ def test_locations_a_hair_apart_are_one(origin_m: float, hair: float) -> None:
     np.testing.assert_array_equal(graph, graph_of_cells(L_SHAPE))
 
 
+def test_thousands_at_one_place_are_refused_without_their_pairs() -> None:
+    locations_m = np.zeros((60_000, 2))
+    locations_m[:, 0] = 1e-9 * np.arange(len(locations_m))
+    with pytest.raises(SceneError, match=r"poses.csv: more than 100 locations each, .* within 0.001 m of one another"):
+        recorded_pose_graph(locations_m, np.zeros(len(locations_m)), 0.5, source="poses.csv")
+
+
 def test_a_blocked_edge_is_blocked_both_ways_and_nothing_else() -> None:
     edge = np.array([[[0.0, 0.5], [0.0, 1.0]]])
     free = recorded_pose_graph(*recorded(L_SHAPE), 0.5, source="poses.csv")

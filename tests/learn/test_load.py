@@ -126,6 +126,16 @@ def test_a_renamed_file_is_known_by_what_it_holds(tmp_path: Path) -> None:
         run_scenes(record, [other, renamed[1]])
 
 
+def test_the_right_file_is_found_beside_another_of_its_name(tmp_path: Path) -> None:
+    request = request_with_files(tmp_path)
+    record = train(request, tmp_path / "run").read_record()
+    (tmp_path / "others").mkdir()
+    write_scene(changed(request.scenes[1]), tmp_path / "others" / "grid.h5")
+    right = (tmp_path / "grid.h5").rename(tmp_path / "old.h5")
+    scenes = run_scenes(record, [tmp_path / "others" / "grid.h5", right, tmp_path / "corridor.h5"], tells_others=False)
+    assert [scene_digest(scene) for scene in scenes] == [scene.digest for scene in record.scenes]
+
+
 def test_what_is_left_out_is_told_of_where_the_run_was_not_trained_there_alone(tmp_path: Path) -> None:
     request = request_with_files(tmp_path)
     record = train(request, tmp_path / "run").read_record()

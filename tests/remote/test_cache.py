@@ -10,10 +10,10 @@ import pytest
 from clearway.errors import ClearwayError
 from clearway.remote import leases
 from clearway.remote.address import fetched_folder
-from clearway.remote.cache import LIMIT_VARIABLE, fetched
+from clearway.remote.cache import LIMIT_VARIABLE, CacheWarning, fetched
 from clearway.remote.records import RECORDS, origin
 from clearway.remote.store import Store
-from helpers.servers_of_files import files_of, web_server
+from helpers.servers_of_files import Dateless, files_of, web_server
 
 SUFFIXES = (".h5",)
 
@@ -59,6 +59,13 @@ def test_another_content_is_another_file(s3: Callable[[str, bytes], None]) -> No
     s3("a.h5", b"after.")
     (after,) = fetched(["s3://rooms/a.h5"], SUFFIXES)
     assert (before.read_bytes(), after.read_bytes()) == (b"before", b"after.")
+
+
+def test_a_copy_of_which_the_server_tells_no_version_is_told_of(tmp_path: Path, web: str) -> None:
+    with web_server(files_of(tmp_path / "web", Dateless)) as address:
+        (path,) = fetched([f"{address}/a.h5"], SUFFIXES)
+        with pytest.warns(CacheWarning, match=rf"a\.h5: its server tells no version .* Remove {path.parent} to fetch"):
+            assert fetched([f"{address}/a.h5"], SUFFIXES) == [path]
 
 
 def test_a_damaged_copy_is_fetched_again(web: str) -> None:

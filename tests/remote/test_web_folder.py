@@ -43,6 +43,12 @@ def test_a_folder_that_moved_is_followed() -> None:
     assert found('<a href="a.h5">', "https://other/new/") == ["https://other/new/a.h5"]
 
 
+def test_a_name_and_password_are_for_the_folder_s_own_host() -> None:
+    files = FilesOfPage("https://me:secret@host/rooms/", "https://other/rooms/")
+    files.feed('<a href="a.h5"><a href="https://host/rooms/b.h5"><a href="http://host/rooms/c.h5">')
+    assert list(files.found) == ["https://other/rooms/a.h5", "https://me:secret@host/rooms/b.h5"]
+
+
 NO_LISTS = ("<a x='", "<a/", "<!--", "<a href='", "<a b=c ", "&#", "</", "<![", "<a" + " " * 200_000)
 
 

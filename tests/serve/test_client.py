@@ -112,6 +112,18 @@ def test_another_service_that_answers_every_request(content) -> None:
             ask()
 
 
+@pytest.mark.parametrize("wrong", [{"action_index": 9}, {"probabilities": ["x"]}, {"value": [1]}])
+def test_an_answer_that_is_no_decision_is_nobody_s_step(wrong: dict[str, object]) -> None:
+    answer = {"action_index": 0, "probabilities": None, "value": None, "arrived": False, **wrong}
+    stranger = httpx.Client(
+        base_url="http://stranger", transport=httpx.MockTransport(lambda request: httpx.Response(200, json=answer))
+    )
+    session = ClientSession(with_service(stranger, Client("http://stranger", TOKEN)), "x")
+    with pytest.raises(ServiceError, match="status 200: http://stranger: no clearway service answers there"):
+        session.act(plain(1))
+    assert session._answered["step"] is None  # nobody knows
+
+
 def test_connections_are_given_up_before_the_service_does() -> None:
     with Client("http://127.0.0.1:9", TOKEN) as client:
         assert client._http._transport._pool._keepalive_expiry == KEEP_ALIVE_S < connections.KEEP_ALIVE_S

@@ -116,13 +116,26 @@ def test_memory_is_bounded() -> None:
         ANSWER.pack(PIXELS, 2**32 - 1, 2**32 - 1),
         ANSWER.pack(PIXELS, 11, 10) + bytes(330),
         ANSWER.pack(PIXELS, 5000, 0),
+        ANSWER.pack(PIXELS, 0, 5),
+        ANSWER.pack(PIXELS, 5, 0),
         ANSWER.pack(7, 1, 1) + bytes(3),
         ANSWER.pack(REFUSED, 2**32 - 1, 0) + bytes(1000),
         ANSWER.pack(REFUSED, 4, 0) + b"nope",
         ANSWER.pack(REFUSED, 10, 0) + b'["no", ""]',
         ANSWER.pack(REFUSED, 2, 0) + b"[]",
     ],
-    ids=["huge", "too many pixels", "too long", "of no kind", "a long refusal", "no JSON", "of no code", "empty"],
+    ids=[
+        "huge",
+        "too many pixels",
+        "too long",
+        "no rows",
+        "no columns",
+        "of no kind",
+        "a long refusal",
+        "no JSON",
+        "of no code",
+        "empty",
+    ],
 )
 def test_a_decoder_whose_answer_is_none_is_ended(answer: bytes) -> None:
     """Its numbers were believed: 12 bytes could ask for all memory there is."""

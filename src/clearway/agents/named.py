@@ -87,6 +87,8 @@ class Foreign:
     def _told(self) -> Iterator[None]:
         try:
             yield
+        except AgentError:  # one of ours, given as it is, tells itself what is wrong
+            raise
         except (Exception, SystemExit) as fault:  # another's code: anything can come of it
             reason = kind_and_reason(fault)
             raise AgentError(f"{self._source}: failed ({reason}). Correct it") from fault

@@ -9,9 +9,10 @@ from typing import Any
 import gymnasium
 from gymnasium.vector import VectorEnv
 
-from clearway.api.arguments import as_whole
+from clearway.api.arguments import as_whole, as_word
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.choices import MODEL_SUFFIXES
+from clearway.envs.arguments import NO_LIMIT
 from clearway.envs.registration import ENV_ID, LIVE_ENV_ID
 from clearway.errors import ArgumentError
 from clearway.rooms import ROOM_NAMES
@@ -43,6 +44,11 @@ def make_env(
     for name in options:
         if name not in known:
             raise ArgumentError(f"{name}: no such option of this environment. Use one of {', '.join(known)}")
+    steps, mode = options.get("max_episode_steps"), options.get("render_mode")
+    if steps is not None and steps != NO_LIMIT:  # Gymnasium looks at both first, in words of its own
+        as_whole("max_episode_steps", steps, 1)
+    if mode is not None:
+        as_word("render_mode", mode)
     options[first] = _room(scenes) if live else load_scenes(scenes)
     if num_envs is None:
         return gymnasium.make(env_id, **options)

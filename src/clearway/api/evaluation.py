@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
 from clearway.agents.agent import Agent
-from clearway.agents.named import AgentMaker, Foreign, agent_maker, checked_agent, named_maker
+from clearway.agents.named import AgentMaker, Foreign, agent_maker, named_maker
 from clearway.agents.selection import ActionSelection
 from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
@@ -119,12 +119,12 @@ class EvaluateResult:
         Where targets are held-out ones, held-out.json and held-out.md.
         """
         path = as_path("folder", folder)
+        name = HELD_OUT if self.held_out else "evaluation"
         try:
             path.mkdir(parents=True, exist_ok=True)
+            write_evaluations(path, self.to_json(), self.evaluations, name)
         except OSError as fault:
             raise ArgumentError(f"folder={path}: not a folder to write to ({fault.strerror}). Give another") from fault
-        name = HELD_OUT if self.held_out else "evaluation"
-        write_evaluations(path, self.to_json(), self.evaluations, name)
 
     def _repr_markdown_(self) -> str:
         return self.markdown()
@@ -225,7 +225,7 @@ def _own(
         _check_fits(card, scenes)
         targets = _targets_of(card) if targets is None else targets
     world = make_world(scenes, chosen_targets(scenes, targets, settings["seed"]))
-    own = checked_agent(AGENT, agent) if made else named_maker(AGENT, agent)(world)
+    own = named_maker(AGENT, (lambda world: agent) if made else agent)(world)
     name = card.scene if isinstance(card, Card) else getattr(agent, "__name__", type(agent).__name__)
     with torch_threads(1):
         evaluations = evaluate_agents(
@@ -273,6 +273,12 @@ def _makers(beside: Mapping[str, str | AgentMaker] | Iterable[str]) -> dict[str,
     """What makes the agents to compare with, by the name they have in tables."""
     if isinstance(beside, str) or not isinstance(beside, Iterable):
         raise ArgumentError(f"beside={beside!r:.80}: expected names of agents. Give a list of them")
+    if not isinstance(beside, Mapping):
+        beside = tuple(beside)
+        if others := [name for name in beside if not isinstance(name, str)]:
+            raise ArgumentError(
+                f"beside: holds {others[0]!r:.80}, expected names of agents. Give makers by their names"
+            )
     named = beside if isinstance(beside, Mapping) else {name: name for name in beside}
     return {str(name): _maker(str(name), one) for name, one in named.items()}
 

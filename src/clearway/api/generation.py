@@ -73,7 +73,7 @@ def generate(
     if name != NO_ENCODER:
         check_encoder(name, sensors)
     crew = None if workers is None else as_whole("workers", workers, 1)
-    as_whole("encoder_seed", encoder_seed, 0, MAX_SEED)
+    encoder_seed = as_whole("encoder_seed", encoder_seed, 0, MAX_SEED)
     requests = [Request(chosen_kind, chosen_split, chosen_seed, number) for number in range(wanted)]
     with (
         kept_connected(ray, crew),

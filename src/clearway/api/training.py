@@ -207,7 +207,7 @@ def train(
             reward_options(reward),
             perturb=_as_words(perturb),
             takes=count,
-            threads=threads,
+            threads=thread_count,
             workers=processes if processes > 1 else None,
             until="solved" if until_solved else None,
             track=track,
@@ -218,7 +218,7 @@ def train(
     with ExitStack() as stack:
         stack.enter_context(torch_threads(thread_count))
         path = stack.enter_context(_temporary()) if kept is None else kept
-        together = partial(train_by_workers, workers=processes, threads=threads, ray=ray)
+        together = partial(train_by_workers, workers=processes, threads=thread_count, ray=ray)
         train_run = train_alone if processes == 1 else together
         folder = train_run(
             request,

@@ -24,14 +24,14 @@ def stdout_console() -> Console:
     """A console for tables, which takes brackets in names as they are."""
     from rich.console import Console
 
-    return Console(markup=False)
+    return Console(markup=False, emoji=False)
 
 
 def stderr_console() -> Console:
     """A console for all that is not the result itself, which takes brackets in names as they are."""
     from rich.console import Console
 
-    return Console(stderr=True, markup=False, highlight=False)
+    return Console(stderr=True, markup=False, emoji=False, highlight=False)
 
 
 def say(text: str) -> None:

@@ -37,7 +37,7 @@ from clearway.cli.train import Train
 from clearway.cli.video import Video
 from clearway.cli.view import ViewRuns, ViewScene
 from clearway.cli.views import TakeViews
-from clearway.errors import ArgumentError, ClearwayError, is_out_of_memory, reason_of
+from clearway.errors import ArgumentError, ClearwayError, is_out_of_memory, printable, reason_of
 
 DESCRIPTION = (
     "Train, evaluate and look at agents that walk to the place where a picture was taken, "
@@ -173,5 +173,5 @@ def _refused(message: str) -> int:
         from clearway.remote.records import with_origins
 
         message = with_origins(message)
-    print("error:", " ".join(message.split()), file=sys.stderr)
+    print("error:", printable(" ".join(message.split())), file=sys.stderr)
     return 2

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import tyro
 
-from clearway.cli.console import stderr_console
+from clearway.cli.console import say
 from clearway.errors import ClearwayError
 
 TOKEN_VARIABLE = "CLEARWAY_TOKEN"
@@ -88,11 +88,6 @@ class Serve:
         else:
             token = checked_token(own or new_token(), f"the variable {TOKEN_VARIABLE}")
             tokens = Tokens([(ALONE, token)])
-        console = stderr_console()
-
-        def say(line: str) -> None:
-            console.print(line, highlight=False, soft_wrap=True)
-
         agent = servable_agent(self.agent, self.scene, say)
         with listening(self.port, self.host) as listener, self._health() as health:
             if health is not None and port_of(health) == port_of(listener):  # at two addresses both could have it

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 DOMAINS = ("", "ai.onnx")
 ENDLESS = ("Loop", "Scan", "SequenceMap")
 MAX_DEPTH = 32  # of graphs in graphs
+MOST_FIELDS = 1_000_000  # looked at, a second or two; the generalist has some thousands
 INSIDE = {
     "model": {7: "graph", 25: "function"},
     "graph": {1: "node", 5: "tensor", 15: "sparse tensor"},
@@ -34,14 +35,18 @@ def problem_of(content: bytes) -> str | None:
     Raises:
         ValueError: it is no message of protobuf.
     """
-    return next(_problems(memoryview(content), "model", 0), None)
+    return next(_problems(memoryview(content), "model", 0, iter(range(MOST_FIELDS))), None)
 
 
-def _problems(message: memoryview, kind: str, depth: int) -> Iterator[str]:
+def _problems(message: memoryview, kind: str, depth: int, left: Iterator[int]) -> Iterator[str]:
+    """What a message asks for and may not; `left`: an item for each field that may still be looked at."""
     if depth > 3 * MAX_DEPTH:  # a graph, its node, the node's attribute
         yield f"graphs more than {MAX_DEPTH} deep"
         return
     for number, value in _fields(message):
+        if next(left, None) is None:
+            yield f"more than {MOST_FIELDS:,} parts"
+            return
         inside = INSIDE.get(kind, {}).get(number)
         if kind == "tensor" and (number == EXTERNAL_DATA or (number == DATA_LOCATION and value != 0)):
             yield "values in another file"
@@ -54,7 +59,7 @@ def _problems(message: memoryview, kind: str, depth: int) -> Iterator[str]:
         elif inside == "function":
             yield "functions of its own"
         elif inside is not None:
-            yield from _problems(_as_bytes(value), inside, depth + 1)
+            yield from _problems(_as_bytes(value), inside, depth + 1, left)
 
 
 def _as_bytes(value: int | memoryview) -> memoryview:

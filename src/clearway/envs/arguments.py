@@ -106,9 +106,17 @@ def chosen_autoreset(mode: AutoresetMode | str) -> AutoresetMode:
         raise EnvError(f"autoreset_mode={mode!r} is unknown. Use one of {names}") from fault
 
 
+def as_array(value: object) -> np.ndarray:
+    """What is given as an array; of lists of several lengths one of objects."""
+    try:
+        return np.asarray(value)
+    except ValueError:
+        return np.asarray(None)
+
+
 def checked_actions(actions: np.ndarray, env_count: int, action_count: int = ACTION_COUNT) -> np.ndarray:
     """The actions as (env_count,) int64; EnvError where they are no actions."""
-    action = np.asarray(actions)
+    action = as_array(actions)
     if not np.issubdtype(action.dtype, np.integer) or action.shape != (env_count,):
         found = f"{action.dtype} of shape {action.shape}"
         raise EnvError(f"actions: expected integers of shape ({env_count},), found {found}. Take action_space.sample()")

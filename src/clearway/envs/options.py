@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from clearway.envs.arguments import RESET_MASK
+from clearway.envs.arguments import RESET_MASK, as_array
 from clearway.errors import EnvError
 from clearway.world.world import DistanceTable, World
 
@@ -95,8 +95,9 @@ def _scenes(value: str | Sequence[str] | None, world: World, env_count: int) -> 
 
 def _states(option: str, value: object, env_count: int) -> np.ndarray:
     """(N,) int64."""
-    states = np.asarray(value)
-    if not np.issubdtype(states.dtype, np.integer) or states.shape not in ((), (env_count,)):
+    states = as_array(value)
+    fits = np.issubdtype(states.dtype, np.integer) and states.shape in ((), (env_count,))
+    if not fits or states.max(initial=0) > np.iinfo(np.int64).max:
         raise EnvError(f"options['{option}']: expected a state id, or one for each of the {env_count}, got {value!r}")
     return np.broadcast_to(states.astype(np.int64), env_count)
 

@@ -138,7 +138,8 @@ def observation_sources(
     """
     if kind not in OBSERVATION_KINDS:
         raise EnvError(f"observations={kind!r} is unknown. Use one of {', '.join(map(repr, OBSERVATION_KINDS))}")
-    if isinstance(sensors, str) or not sensors or len(set(sensors)) < len(sensors):
+    names = list(sensors) if isinstance(sensors, Sequence) and not isinstance(sensors, str) else []
+    if not names or not all(isinstance(name, str) for name in names) or len({*names}) < len(names):
         raise EnvError(f"sensors={sensors!r}: expected names, each once, such as ('rgb', 'depth')")
     if kind == "pictures":
         return {_keys(name): PictureSource(scenes, name) for name in sensors}

@@ -26,6 +26,7 @@ from clearway.evaluation.bootstrap import LEVEL
 RESAMPLES = 20_000
 MOST_DIVISIONS = 200_000
 """Of runs that can be divided in so many ways all are gone through, as of 10 and 10; of more, `RESAMPLES` are drawn."""
+ROUNDED = 12  # decimals, of shares of the largest score
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,7 @@ def difference(
     first: np.ndarray, second: np.ndarray, target_scene: np.ndarray, *, resamples: int = RESAMPLES
 ) -> Estimate:
     """By how much the mean of the first kind exceeds that of the second, see `mean_estimate`; arguments as below."""
-    weights = _weights(target_scene)
-    own = [scores @ weights for scores in (first, second)]
+    own = _centred(first, second, target_scene)
     means = [runs[_redrawn(len(runs), resamples, seed)].mean(1) for seed, runs in enumerate(own)]
     value = float(own[0].mean() - own[1].mean())
     return Estimate(value, _interval(means[0] - means[1], min(len(first), len(second))))
@@ -106,8 +106,7 @@ def permutation_p(first: np.ndarray, second: np.ndarray, target_scene: np.ndarra
         target_scene: (M,) int.
         allowed: by which the first may exceed the second and still count as equal.
     """
-    weights, count = _weights(target_scene), len(first)
-    runs = np.concatenate([first @ weights - allowed, second @ weights])
+    count, runs = len(first), np.concatenate(_centred(first, second, target_scene, allowed))
     if math.comb(len(runs), count) <= MOST_DIVISIONS:
         chosen = _divisions(len(runs), count)
     else:
@@ -117,6 +116,18 @@ def permutation_p(first: np.ndarray, second: np.ndarray, target_scene: np.ndarra
     np.put_along_axis(one, chosen, True, axis=1)
     statistic = _welch(runs, one)  # of the runs as they are, first
     return float((np.abs(statistic) >= abs(statistic[0]) * (1 - 1e-9)).mean())
+
+
+def _centred(first: np.ndarray, second: np.ndarray, target_scene: np.ndarray, allowed: float = 0.0) -> list[np.ndarray]:
+    """Means of the runs of both kinds, (R,) and (R',), less the mean of all; the first less what is allowed, too.
+
+    Runs that are equal are so to the last bit: what rounding leaves between them would be told for a difference.
+    """
+    weights = _weights(target_scene)
+    own = [first @ weights - allowed, second @ weights]
+    size = max(abs(allowed), *(float(np.abs(scores).max(initial=0.0)) for scores in (first, second))) or 1.0
+    middle = np.concatenate(own).mean()
+    return [np.round((means - middle) / size, ROUNDED) * size for means in own]
 
 
 @cache

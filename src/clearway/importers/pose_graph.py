@@ -16,6 +16,7 @@ from clearway.errors import SceneError
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 
 SAME_PLACE_M = 1e-3  # locations closer than this are one
+MOST_AT_A_PLACE = 100  # told a little apart; each has a heading of its own
 REACH = 0.1  # a move ends at a location no farther from where it should end than this share of a step
 HEADING_TOLERANCE_DEG = 1.0
 STEP = "Give the distance of neighbouring locations as the step, and headings along which they lie"
@@ -44,10 +45,10 @@ def recorded_pose_graph(
         blocked_source: file that errors of blocked edges name; by default `source`.
 
     Raises:
-        SceneError: a pose stands twice, a location lacks a heading, no location lies a step from another, or a blocked
-            edge is none.
+        SceneError: a pose stands twice, far too many lie at one place, a location lacks a heading, no location lies a
+            step from another, or a blocked edge is none.
     """
-    places, location = _grouped(locations_m)
+    places, location = _grouped(locations_m, source)
     pose = _poses(location, headings_deg, places, source)  # (L, H)
     heading_count = pose.shape[1]
     turn = np.deg2rad(np.arange(heading_count) * 360 / heading_count + headings_deg[pose[0, 0]])
@@ -68,10 +69,20 @@ def recorded_pose_graph(
     return graph
 
 
-def _grouped(locations_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distinct locations (L, 2), in order of first appearance, and the one of each pose, (S,)."""
+def _grouped(locations_m: np.ndarray, source: str | Path) -> tuple[np.ndarray, np.ndarray]:
+    """Distinct locations (L, 2), in order of first appearance, and the one of each pose, (S,).
+
+    Raises:
+        SceneError: so many lie so close that their pairs would not fit into memory.
+    """
     given, spot = np.unique(locations_m, axis=0, return_inverse=True)
-    pairs = KDTree(given).query_pairs(SAME_PLACE_M, output_type="ndarray")
+    tree = KDTree(given)
+    if tree.count_neighbors(tree, SAME_PLACE_M) > MOST_AT_A_PLACE * len(given):
+        problem = (
+            f"more than {MOST_AT_A_PLACE} locations each, on average, lie within {SAME_PLACE_M:g} m of one another"
+        )
+        raise SceneError(source, problem, "Give every pose once, in metres")
+    pairs = tree.query_pairs(SAME_PLACE_M, output_type="ndarray")
     near = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(given), len(given)))
     _, place = connected_components(near, directed=False)
     _, first, group = np.unique(place[spot.reshape(-1)], return_index=True, return_inverse=True)

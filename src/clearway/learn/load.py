@@ -220,13 +220,13 @@ def _places(record: RunRecord) -> dict[str, str]:
 
 
 def _place_among(given: Sequence[Scene], wanted: SceneRecord) -> int:
-    """Where the scene of a run stands among some: by its name, else by what it holds."""
+    """Where the scene of a run stands among some: by what it holds, else by its name."""
     names = [scene.name for scene in given]
+    for place in sorted(range(len(given)), key=lambda place: names[place] != wanted.name):  # mostly the first
+        if scene_digest(given[place]) == wanted.digest:
+            return place
     if wanted.name in names:
         return names.index(wanted.name)
-    for place, scene in enumerate(given):
-        if scene_digest(scene) == wanted.digest:
-            return place
     others = _listed(names)
     problem = f"scene {wanted.name} of the run is not among the files given ({others}), by name or by what they hold"
     raise RunError(f"{problem}. Add it to --scenes; an agent walks where it was trained, and {GENERALIST} anywhere")

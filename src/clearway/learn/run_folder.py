@@ -94,7 +94,7 @@ class RunFolder:
 
     def clear_parts(self) -> None:
         """Remove what a process that was killed left unfinished."""
-        for name in (RUN_FILE, METRICS_FILE):
+        for name in (RUN_FILE, METRICS_FILE, SETTINGS_FILE):
             for part in self.path.glob(f".{name}.*.part"):
                 part.unlink()
         for part in self.path.glob(f"{COPIED}*"):

@@ -43,7 +43,7 @@ def check_tracker(name: str | None) -> None:
     if name is None:
         return
     if name not in get_args(TrackerName):
-        raise RunError(f"--track {name:.40}: expected {' or '.join(get_args(TrackerName))}. Give one of them")
+        raise RunError(f"--track {name!s:.40}: expected {' or '.join(get_args(TrackerName))}. Give one of them")
     if importlib.util.find_spec(name) is None:
         raise RunError(f"--track {name}: needs {name}. {install_hint(name)}")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from clearway.choices import MODEL_SUFFIXES
-from clearway.envs.arguments import check_switch, scene_of_file
+from clearway.envs.arguments import as_array, check_switch, scene_of_file
 from clearway.errors import EnvError
 from clearway.live.conditions import MOST, Perturbations
 from clearway.live.live_room import LiveRoom, live_room, live_room_named
@@ -121,7 +121,7 @@ def _is_number(value: object) -> bool:
 
 def checked_drives(actions: np.ndarray, env_count: int) -> np.ndarray:
     """Speeds and turn rates, (env_count, 2) float64 within -1 and 1; EnvError where they are none."""
-    drives = np.asarray(actions)
+    drives = as_array(actions)
     if drives.dtype.kind not in "fiu" or drives.shape != (env_count, 2):
         found = f"{drives.dtype} of shape {drives.shape}"
         raise EnvError(f"actions: expected speed and turn rate, shape ({env_count}, 2), found {found}")
@@ -136,10 +136,7 @@ def checked_ends(option: str, value: object, env_count: int) -> list[int | tuple
     Raises:
         EnvError: the option is neither, for all environments or for each.
     """
-    try:
-        ends = np.asarray(value)
-    except ValueError:  # ragged
-        ends = np.zeros(0)
+    ends = as_array(value)
     whole = np.issubdtype(ends.dtype, np.integer)
     if whole and ends.shape in ((), (env_count,)):
         return [int(state) for state in np.broadcast_to(ends, env_count)]
@@ -172,10 +169,7 @@ def checked_targets(targets: Sequence[int] | str | None) -> np.ndarray | None:
     """State ids, (T,) int64, or None as it is; EnvError where they are none."""
     if targets is None:
         return None
-    try:
-        found = np.asarray(targets)
-    except ValueError:  # lists of several lengths
-        found = np.empty(0)
+    found = as_array(targets)
     if found.ndim != 1 or not len(found) or not np.issubdtype(found.dtype, np.integer):
         raise EnvError(f"targets={targets!r:.80}: expected state ids, such as [26, 37]")
     return found.astype(np.int64)

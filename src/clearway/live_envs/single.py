@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from clearway.envs.arguments import RESET_MASK, seed_words
+from clearway.envs.arguments import RESET_MASK, as_array, seed_words
 from clearway.errors import EnvError
 from clearway.live_envs.arguments import LIVE_RENDER_MODES, PerturbationSource, RoomSource
 from clearway.live_envs.vector import (
@@ -209,7 +209,7 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
             EnvError: the action is none.
             ResetNeeded: before the first reset, or after the episode's end.
         """
-        result = self._batch.step(np.expand_dims(np.asarray(action), 0))
+        result = self._batch.step(np.expand_dims(as_array(action), 0))
         observation, reward, terminated, truncated, info = result
         return _first(observation), float(reward[0]), bool(terminated[0]), bool(truncated[0]), _first_info(info)
 

@@ -41,7 +41,7 @@ AHEAD = 1 / 8  # of the limit, for files that pass, and that as many may have as
 
 
 class CacheWarning(UserWarning):
-    """A set does not fit into the cache."""
+    """A set does not fit into the cache, or of a copy in it nobody can tell whether it is as its server has it."""
 
 
 def fetched(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass: bool = False) -> list[Path]:
@@ -69,6 +69,7 @@ def fetched_each(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass:
     folder = fetched_folder()
     places = {file: folder / _entry(file) / file.name for file in files}
     with cache_faults_named(folder):
+        _warn_of_unversioned(places)
         may_pass = may_pass and all(file.version and without_secrets(file.address) == file.address for file in files)
         with locked(folder / ".cache"):
             write_records(folder, {_entry(file): record_text(file.address, file.version) for file in files})
@@ -83,6 +84,15 @@ def fetched_each(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass:
             warnings.warn(f"{without_secrets(addresses[0])}: {told}; {remedy}", CacheWarning, stacklevel=2)
     in_order = iter(found)
     return [[places[file] for file in islice(in_order, len(some))] for some in listed]
+
+
+def _warn_of_unversioned(places: Mapping[RemoteFile, Path]) -> None:
+    if unsure := [file for file, place in places.items() if not file.version and is_whole(place)]:
+        told = f"{without_secrets(unsure[0].address)}: its server tells no version (ETag, Last-Modified) of its files"
+        remedy = f"Remove {places[unsure[0]].parent} to fetch it again"
+        others = f" ({len(unsure)} such files)" if len(unsure) > 1 else ""
+        problem = "a copy of the same size that was fetched before is taken for the file"
+        warnings.warn(f"{told}; {problem}{others}. {remedy}", CacheWarning, stacklevel=3)
 
 
 def fetch_again(places: Sequence[Path]) -> None:

@@ -65,6 +65,7 @@ class FilesOfPage(HTMLParser):
     def __init__(self, folder: str, page: str) -> None:
         super().__init__()
         self._page, self._places = page, {_place(folder), _place(page)}
+        self._asked = urlsplit(folder)
         self._seen: set[str] = set()
         self.found: dict[str, None] = {}
 
@@ -89,6 +90,9 @@ class FilesOfPage(HTMLParser):
 
     def _keep(self, parts: SplitResult) -> None:
         if parts.path.rpartition("/")[2] and _place(parts.geturl()) in self._places:
+            name, at, host = self._asked.netloc.rpartition("@")
+            if (parts.scheme, parts.netloc) == (self._asked.scheme, host):  # a name and password are for no other host
+                parts = parts._replace(netloc=f"{name}{at}{host}")
             self.found[parts._replace(fragment="").geturl()] = None
 
 

@@ -106,7 +106,7 @@ class Client:
             kept = answer.json()["error"]
             code, message = str(kept["code"]), str(kept["message"])
         except (ValueError, KeyError, TypeError) as fault:
-            raise self._stranger(answer) from fault
+            raise self.stranger(answer.status_code) from fault
         raise ServiceError(code, message)
 
     def _answered(self, method: str, path: str, content: dict[str, Any]) -> tuple[Any, int]:
@@ -141,14 +141,15 @@ class Client:
         try:
             found = answer.json()
         except ValueError as fault:
-            raise self._stranger(answer) from fault
+            raise self.stranger(answer.status_code) from fault
         if not isinstance(found, dict) or not found.keys() >= set(names):
-            raise self._stranger(answer)
+            raise self.stranger(answer.status_code)
         return found
 
-    def _stranger(self, answer: Any) -> ServiceError:
+    def stranger(self, status: object) -> ServiceError:
+        """The error of who answers otherwise than the service would; `status`: of the answer."""
         problem = f"{self._http.base_url}: no clearway service answers there"
-        return ServiceError(f"status {answer.status_code}", f"{problem}. Check the address")
+        return ServiceError(f"status {status}", f"{problem}. Check the address")
 
     def close(self) -> None:
         """Close the connection."""
@@ -196,9 +197,14 @@ class ClientSession:
         with self._counted("step") as number:
             content = _body(picture)
             answer = self._client.ask_json("POST", f"{self._path}/steps", *ANSWER, params=number, **content)
-        told, value, self.arrived = (answer[name] for name in ANSWER[1:])
-        probabilities = None if told is None else np.array(told, np.float32)
-        return Decision(Action(answer["action_index"]), probabilities, None if value is None else float(value))
+            index, told, value, arrived = (answer[name] for name in ANSWER)
+            try:
+                probabilities = None if told is None else np.array(told, np.float32)
+                decision = Decision(Action(index), probabilities, None if value is None else float(value))
+            except (ValueError, TypeError, OverflowError) as fault:
+                raise self._client.stranger("200") from fault
+        self.arrived = arrived
+        return decision
 
     @contextmanager
     def _counted(self, what: str) -> Iterator[dict[str, int]]:

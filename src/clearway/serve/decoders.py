@@ -144,6 +144,8 @@ class Decoder:
             raise _refusal(bytes(await self._received(first)))
         if kind != PIXELS or first * second > self._bounds.pixels or max(first, second) > self._bounds.side:
             raise ValueError("more than was asked for")
+        if not first or not second:
+            raise ValueError("no picture")
         pixels = await self._received(first * second * 3)
         return np.frombuffer(pixels, np.uint8).reshape(first, second, 3)
 
