@@ -158,7 +158,7 @@ def _is_alive(process: int) -> bool:
 
 def _umask() -> int:
     with suppress(OSError):
-        told = re.search(r"^Umask:\s*([0-7]+)$", Path("/proc/self/status").read_text(encoding="utf-8"), re.MULTILINE)
+        told = re.search(r"^Umask:\s*([0-7]+)$", read_text(Path("/proc/self/status"), 1024**2), re.MULTILINE)
         if told:
             return int(told[1], 8)
     with _UMASK:  # others make files while it is set: there is no other way to read it here

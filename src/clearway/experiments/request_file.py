@@ -57,7 +57,8 @@ def with_earlier(request: ReproduceRequest) -> ReproduceRequest:
     except RunError:
         same = False
     if not same:
-        return replace(request, names=in_order(request.names))
+        ordered = in_order(request.names)
+        return request if ordered == list(request.names) else replace(request, names=ordered)
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
     packages = {**earlier.packages, **request.packages}
