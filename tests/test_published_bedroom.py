@@ -167,7 +167,7 @@ def check_time_in_the_bedroom(section: Section, setting: Setting) -> None:
     """How long agents stay in the zones there."""
     part, mark = section_of(EVIDENCE, "The bedroom: time in the zones"), mark_steps(setting, setting.targets)
     lines, settled, shares = rows_of(part), dict[str, int](), dict[str, list[float]]()
-    for group in compared(setting, table1.REWARDS):
+    for group in compared(setting, table1.TABLE_1_REWARDS):
         by_seed = settled_by_seed(setting.out, group, mark)
         share = group.scores(setting.out, setting.world().target_count).of("share_collision").mean(1)
         settled[group.agent] = sum(has for _, has in by_seed.values())

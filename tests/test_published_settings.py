@@ -205,7 +205,7 @@ def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> 
         assert lost == "0 of 25" and frames[1] == 5
     bumps = {
         group.agent: group.scores(setting.out, world.target_count).of("collisions").mean(1)
-        for group in compared(setting, table1.REWARDS)
+        for group in compared(setting, table1.TABLE_1_REWARDS)
     }
     ends = [sorted(bumps[agent])[:: len(bumps[agent]) - 1] for agent in ("shortest", "collision-aware", "bump")]
     (short, aware, bump), page = ends, EVIDENCE.replace("\n", " ")

@@ -237,7 +237,7 @@ def check_results_of_shuffles(table: ReportTable, late: ReportTable) -> None:
 def check_runs_one_by_one(setting: Setting, shuffled: str, time_in: str) -> None:
     """What the two sections say of single runs, and of those that had settled."""
     world, mark = setting.world(), mark_steps(setting, setting.targets)
-    groups = {group.agent: group for group in (*shuffles._groups(setting), *compared(setting, table1.REWARDS))}
+    groups = {group.agent: group for group in (*shuffles._groups(setting), *compared(setting, table1.TABLE_1_REWARDS))}
     scores = {agent: group.scores(setting.out, world.target_count) for agent, group in groups.items()}
     settled = {agent: frames_until_settled(setting.out, group, mark) for agent, group in groups.items()}
     ended = {agent: frames[:, 0] < setting.budget.frames for agent, (frames, _) in settled.items()}
