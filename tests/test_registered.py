@@ -50,6 +50,7 @@ ASKED_FIRST = {
     ("four-rooms-zones", ""): {66},
     ("further-room", ""): {69},
     ("hard-bathroom", ""): {58},
+    ("off-grid-settled", ""): {75},
     ("perturbed-bathroom", ""): {74},
     ("shuffles-bathroom", ""): {61, 62},
     ("step-size-bathroom", ""): {60},
