@@ -106,14 +106,17 @@ def find_record(name: str = NAME) -> EncoderRecord:
 
 def from_record(record: EncoderRecord) -> EyesEncoder:
     """The encoder that a record names. Raises EncoderError where there are other eyes now, none, or damaged ones."""
-    name, eyes = str(record.settings.get("eyes")), None
-    for _ in range(2):  # others may take their place while they are read
-        if find_record(name).identity != record.identity:
-            problem = f"encoder {record.name}: the eyes '{name}' are others than those that made the features"
-            raise EncoderError(f"{problem}. Get those, or encode the scene again")
-        eyes = eyes or read_eyes(_folder(name))
-    assert eyes is not None
+    name = str(record.settings.get("eyes"))
+    _check_same(record, name)
+    eyes = read_eyes(_folder(name))
+    _check_same(record, name)  # others may have taken their place meanwhile
     return EyesEncoder(record, eyes)
+
+
+def _check_same(record: EncoderRecord, name: str) -> None:
+    if find_record(name).identity != record.identity:
+        problem = f"encoder {record.name}: the eyes '{name}' are others than those that made the features"
+        raise EncoderError(f"{problem}. Get those, or encode the scene again")
 
 
 def card_of(record: EncoderRecord) -> EyesCard:
