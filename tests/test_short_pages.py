@@ -100,14 +100,14 @@ REWARDS = ("collision-aware", "shortest")
 
 def test_results_show_earlier_figures_where_later_ones_lie_outside_their_intervals() -> None:
     earlier = sentence(
-        r"\(evidence.md#the-papers-claims-of-fresh-seeds\) had ([\d.]+) and ([\d.]+) collisions", RESULTS
+        r"\(evidence.md#the-papers-claims-of-fresh-seeds\) had ([\d.]+) against ([\d.]+) collisions", RESULTS
     )
     assert earlier[::-1] == sentence(r"earlier seeds: ([\d.]+), ([\d.]+) \(no record\)", README)
     hard = rows_of(section_of(EVIDENCE, "Hard targets"))
-    steps, collisions = sentence(r"Seeds 0-4 \(`collision-aware`, 1 M\): (\S+), (\S+)\.", RESULTS)
+    steps, collisions = sentence(r"Seeds 0-4 \(`collision-aware`, 1 M\): steps (\S+), collisions (\S+)\.", RESULTS)
     for told, begin in ((steps, "steps of `collision-aware` after 1 M"), (collisions, "its collisions then")):
         assert told.replace("-", " to ") == row(hard, begin)[1]
-    (found,) = sentence(r"\(Five, seeds 0-4: (\S+ %)\.\)", RESULTS)
+    (found,) = sentence(r"\(Five targets, seeds 0-4: (\S+ %)\.\)", RESULTS)
     assert f"where it was {found.replace('-', ' to ')}" in EVIDENCE
     shortest, aware, bump = sentence(r"\[earlier seeds\]\(evidence.md#four-rooms\): (\S+), (\S+), ([\d.]+)\.", RESULTS)
     told = rf"collisions {shortest} \(\S+\), {bump} \(\S+\) and {aware} \(\S+\) under `shortest`, `bump` and"
@@ -192,8 +192,8 @@ def test_the_first_page_has_the_rooms_and_the_bedrooms_verdicts() -> None:
         (r"by path length\) (\d+) %", ("No tour", "rooms")),
         (r"after a 500-step tour ([\d.]+) %", ("After a tour", "rooms, after a tour")),
         (r"\(perturbed: ([\d.]+)\)", ("Under perturbed pictures", "toured, perturbed")),
-        (r"in flats (\d+) \(asked: 35\) and", ("No tour", "flats")),
-        (r"in flats \d+ \(asked: 35\) and (\d+) %", ("After a tour", "flats, after a tour")),
+        (r"in flats (\d+) \(registered: 35\) and", ("No tour", "flats")),
+        (r"in flats \d+ \(registered: 35\) and (\d+) %", ("After a tour", "flats, after a tour")),
     ],
 )
 def test_the_first_page_has_the_generalists_figures(pattern: str, named: tuple[str, str]) -> None:
@@ -201,3 +201,8 @@ def test_the_first_page_has_the_generalists_figures(pattern: str, named: tuple[s
     title, begin = named
     spl = row(rows_of(section_of(SEEING, title)), begin)[2]
     assert_same(told, spl.split(" (")[0])
+
+
+def test_the_first_page_has_what_was_registered_of_flats() -> None:
+    (told,) = sentence(r"in flats \d+ \(registered: (\d+)\)", README)
+    assert row(rows_of(SEEING), "flats, no tour: success, SPL")[0].endswith(f", {told} %")

@@ -98,12 +98,17 @@ def _bound(statement: ast.AST) -> set[str]:
 
 
 def _called_on(statement: ast.AST) -> set[str]:
-    """The name whose method a statement calls, and so may change: of `TABLE.update(turn=3)` TABLE."""
-    called = statement.value.func if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call) else None
-    owner = called.value if isinstance(called, ast.Attribute) else None
-    while isinstance(owner, ast.Attribute | ast.Subscript | ast.Call):
-        owner = owner.func if isinstance(owner, ast.Call) else owner.value
-    return {owner.id} if isinstance(owner, ast.Name) else set()
+    """Names whose methods a statement calls, and so may change: of `TABLE.update(turn=3)` TABLE. None if it defines."""
+    if isinstance(statement, DEFINITIONS):
+        return set()
+    found = set[str]()
+    for node in ast.walk(statement):
+        owner: ast.AST | None = node.func if isinstance(node, ast.Call) else None
+        if isinstance(owner, ast.Attribute):
+            while isinstance(owner, ast.Attribute | ast.Subscript | ast.Call):
+                owner = owner.func if isinstance(owner, ast.Call) else owner.value
+            found |= {owner.id} if isinstance(owner, ast.Name) else set()
+    return found
 
 
 def _names(tree: ast.AST) -> set[str]:

@@ -19,6 +19,8 @@ def test_one_environment_and_many(tmp_path) -> None:
     assert isinstance(env.unwrapped, ImageGoalEnv)
     assert env.reset(seed=0, options={"start": 4})[1]["distance_to_go"] == 3
     assert [env.step(0)[2:4] for _ in range(3)] == [(False, False), (False, False), (True, True)]
+    assert clearway.make_env(corridor_scene(), max_episode_steps=np.int64(3)).spec.max_episode_steps == 3
+    assert clearway.make_env(corridor_scene(), max_episode_steps=-1).spec.max_episode_steps is None
     envs = clearway.make_env(corridor_scene(), num_envs=np.int64(3), reward="shortest")
     assert isinstance(envs, ImageGoalVectorEnv)
     assert envs.reset(seed=0)[0]["observation"].shape[:2] == (3, 4)
@@ -40,6 +42,8 @@ def test_pictures_of_a_file(tmp_path) -> None:
         ({"num_envs": "3"}, "num_envs='3': expected a whole number"),
         ({"max_episode_steps": 0}, "max_episode_steps=0: expected a whole number from 1 on"),
         ({"max_episode_steps": "5"}, "max_episode_steps='5': expected a whole number"),
+        ({"max_episode_steps": -1.0}, "max_episode_steps=-1.0: expected a whole number"),
+        ({"max_episode_steps": np.array([5, 6])}, "max_episode_steps=array.*: expected a whole number"),
         ({"render_mode": 5}, "render_mode=5: expected a word"),
         ({"sensors": 5}, "sensors=5: expected names"),
         ({"sensors": [["rgb"]]}, "expected names"),

@@ -173,6 +173,13 @@ def test_a_request_that_was_kept_by_an_older_version_is_gone_on_with(kept: list[
     assert list(with_earlier(asked(tmp_path, "fig3")).names) == ["fig3", "table3"]
 
 
+def test_experiments_that_were_kept_twice_are_reported_once(tmp_path: Path) -> None:
+    keep_request(asked(tmp_path, "table3"))
+    path = tmp_path / REQUEST_FILE
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"names": ["table3", "fig3", "table3"]}))
+    assert read_request(tmp_path).names == ["fig3", "table3"]
+
+
 @pytest.mark.parametrize("edit", [{"new_field": 1}, {"changes": ["gone=3"]}])
 def test_who_replaces_a_request_that_cannot_be_read_is_told(edit: dict[str, object], tmp_path: Path) -> None:
     keep_request(asked(tmp_path, "table3"))

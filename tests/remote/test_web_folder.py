@@ -22,6 +22,7 @@ def found(page: str, where: str = FOLDER) -> list[str]:
         ("./a.h5", f"{FOLDER}a.h5"),
         ("/rooms/a.h5?version=1#top", f"{FOLDER}a.h5?version=1"),
         ("https://host/rooms/a.h5", f"{FOLDER}a.h5"),
+        ("HTTPS://HOST:443/rooms/a.h5", "https://host/rooms/a.h5"),
         ("a%20b.h5", f"{FOLDER}a%20b.h5"),
         ("../a.h5", None),
         ("deeper/a.h5", None),
@@ -29,6 +30,7 @@ def found(page: str, where: str = FOLDER) -> list[str]:
         ("http://host/rooms/a.h5", None),
         ("//other/rooms/a.h5", None),
         ("https://host:8443/rooms/a.h5", None),
+        ("https://host:port/rooms/a.h5", None),
         ("file:///rooms/a.h5", None),
         ("https://[::1/a.h5", None),
     ],
@@ -47,6 +49,12 @@ def test_a_name_and_password_are_for_the_folder_s_own_host() -> None:
     files = FilesOfPage("https://me:secret@host/rooms/", "https://other/rooms/")
     files.feed('<a href="a.h5"><a href="https://host/rooms/b.h5"><a href="http://host/rooms/c.h5">')
     assert list(files.found) == ["https://other/rooms/a.h5", "https://me:secret@host/rooms/b.h5"]
+
+
+def test_nor_are_they_lost_where_the_same_host_is_spelt_otherwise() -> None:
+    files = FilesOfPage("https://me:secret@Host/rooms/", "https://host:443/rooms/")
+    files.feed('<a href="a.h5"><a href="https://hOST/rooms/b.h5"><a href="https://host:8443/rooms/c.h5">')
+    assert list(files.found) == [f"https://me:secret@Host/rooms/{name}.h5" for name in "ab"]
 
 
 NO_LISTS = ("<a x='", "<a/", "<!--", "<a href='", "<a b=c ", "&#", "</", "<![", "<a" + " " * 200_000)

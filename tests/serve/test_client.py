@@ -112,14 +112,25 @@ def test_another_service_that_answers_every_request(content) -> None:
             ask()
 
 
-@pytest.mark.parametrize("wrong", [{"action_index": 9}, {"probabilities": ["x"]}, {"value": [1]}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"action_index": 9},
+        {"probabilities": ["x"] * 4},
+        {"probabilities": [0.5, 0.5]},
+        {"probabilities": 0.5},
+        {"value": [1]},
+        {"arrived": "no"},
+        {"arrived": 1},
+    ],
+)
 def test_an_answer_that_is_no_decision_is_nobody_s_step(wrong: dict[str, object]) -> None:
     answer = {"action_index": 0, "probabilities": None, "value": None, "arrived": False, **wrong}
     stranger = httpx.Client(
-        base_url="http://stranger", transport=httpx.MockTransport(lambda request: httpx.Response(200, json=answer))
+        base_url="http://stranger", transport=httpx.MockTransport(lambda request: httpx.Response(203, json=answer))
     )
     session = ClientSession(with_service(stranger, Client("http://stranger", TOKEN)), "x")
-    with pytest.raises(ServiceError, match="status 200: http://stranger: no clearway service answers there"):
+    with pytest.raises(ServiceError, match="status 203: http://stranger: no clearway service answers there"):
         session.act(plain(1))
     assert session._answered["step"] is None  # nobody knows
 

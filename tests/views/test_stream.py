@@ -116,10 +116,16 @@ def test_one_sensor_alone_can_be_read(views, monkeypatch) -> None:
 
 
 def test_poses_that_are_too_few_for_a_block_go_with_the_one_before(views, monkeypatch) -> None:
-    monkeypatch.setattr(stream, "BLOCK_POSES", 4)  # of ten poses four, and six, of which every epoch three come twice
+    monkeypatch.setattr(stream, "BLOCK_POSES", 4)  # of ten poses three, three and four
     seen = {row for epoch in range(20) for row in flat(views.batches(6, epoch=epoch, together=3))}
     assert seen == set(EVERY)
     assert views.batch_count(6, together=3) == 3 * 3
+
+
+def test_a_room_of_fewer_poses_than_go_together_is_named(views) -> None:
+    assert views.batch_count(22, together=11) == 0
+    with pytest.raises(ClearwayError, match="together=11: a room has but 10 poses"):
+        views.batches(22, together=11)
 
 
 def test_blocks_of_large_pictures_are_smaller(views, monkeypatch) -> None:

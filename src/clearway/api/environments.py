@@ -45,8 +45,9 @@ def make_env(
         if name not in known:
             raise ArgumentError(f"{name}: no such option of this environment. Use one of {', '.join(known)}")
     steps, mode = options.get("max_episode_steps"), options.get("render_mode")
-    if steps is not None and steps != NO_LIMIT:  # Gymnasium looks at both first, in words of its own
-        as_whole("max_episode_steps", steps, 1)
+    if steps is not None:  # Gymnasium looks at both first, in words of its own
+        no_limit = type(steps) is int and steps == NO_LIMIT
+        options["max_episode_steps"] = steps if no_limit else as_whole("max_episode_steps", steps, 1)
     if mode is not None:
         as_word("render_mode", mode)
     options[first] = _room(scenes) if live else load_scenes(scenes)

@@ -16,7 +16,7 @@ from clearway.errors import SceneError
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 
 SAME_PLACE_M = 1e-3  # locations closer than this are one
-MOST_AT_A_PLACE = 100  # told a little apart; each has a heading of its own
+MOST_NEAR = 100  # locations so close to one, on average: so often one is told a little otherwise, once a heading
 REACH = 0.1  # a move ends at a location no farther from where it should end than this share of a step
 HEADING_TOLERANCE_DEG = 1.0
 STEP = "Give the distance of neighbouring locations as the step, and headings along which they lie"
@@ -77,10 +77,8 @@ def _grouped(locations_m: np.ndarray, source: str | Path) -> tuple[np.ndarray, n
     """
     given, spot = np.unique(locations_m, axis=0, return_inverse=True)
     tree = KDTree(given)
-    if tree.count_neighbors(tree, SAME_PLACE_M) > MOST_AT_A_PLACE * len(given):
-        problem = (
-            f"more than {MOST_AT_A_PLACE} locations each, on average, lie within {SAME_PLACE_M:g} m of one another"
-        )
+    if tree.count_neighbors(tree, SAME_PLACE_M) > MOST_NEAR * len(given):
+        problem = f"on average more than {MOST_NEAR} locations lie within {SAME_PLACE_M:g} m of a location"
         raise SceneError(source, problem, "Give every pose once, in metres")
     pairs = tree.query_pairs(SAME_PLACE_M, output_type="ndarray")
     near = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(given), len(given)))

@@ -14,6 +14,7 @@ from urllib.parse import SplitResult, urljoin, urlsplit
 MAX_PAGE_BYTES = 8 * 1024**2
 MAX_LINKS = 100_000
 PIECE = 64 * 1024  # characters that are looked through at a time
+PORTS = {"http": 80, "https": 443}  # where an address names none
 
 
 class PageTooLong(OSError):
@@ -90,13 +91,17 @@ class FilesOfPage(HTMLParser):
 
     def _keep(self, parts: SplitResult) -> None:
         if parts.path.rpartition("/")[2] and _place(parts.geturl()) in self._places:
-            name, at, host = self._asked.netloc.rpartition("@")
-            if (parts.scheme, parts.netloc) == (self._asked.scheme, host):  # a name and password are for no other host
-                parts = parts._replace(netloc=f"{name}{at}{host}")
+            if _server(parts) == _server(self._asked):  # a name and password are for no other
+                parts = parts._replace(netloc=self._asked.netloc)
             self.found[parts._replace(fragment="").geturl()] = None
 
 
-def _place(address: str) -> tuple[str, str, str]:
-    """Scheme, host with port, and folder of an address."""
+def _place(address: str) -> tuple[object, ...]:
+    """Server and folder of an address. Raises ValueError where its port is none."""
     parts = urlsplit(address)
-    return parts.scheme, parts.netloc.rpartition("@")[2], parts.path.rpartition("/")[0]
+    return *_server(parts), parts.path.rpartition("/")[0]
+
+
+def _server(parts: SplitResult) -> tuple[str, str | None, int | None]:
+    """Scheme, host and port, however they are spelt. Raises ValueError."""
+    return parts.scheme, parts.hostname, parts.port or PORTS.get(parts.scheme)

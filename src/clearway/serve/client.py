@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
@@ -19,7 +19,7 @@ from clearway.deploy.agent import checked_picture
 from clearway.deploy.navigator import Decision, Selection, checked_seed
 from clearway.errors import ClearwayError, DeployError, install_hint
 from clearway.regular_files import read_bytes
-from clearway.scenes.actions import Action
+from clearway.scenes.actions import ACTION_COUNT, Action
 
 TIMEOUT_S = 30.0
 AGAIN_S, FIRST_PAUSE_S = 10.0, 0.05  # after its begin, a request is sent again whose connection broke; pauses double
@@ -106,7 +106,7 @@ class Client:
             kept = answer.json()["error"]
             code, message = str(kept["code"]), str(kept["message"])
         except (ValueError, KeyError, TypeError) as fault:
-            raise self.stranger(answer.status_code) from fault
+            raise self._stranger(answer.status_code) from fault
         raise ServiceError(code, message)
 
     def _answered(self, method: str, path: str, content: dict[str, Any]) -> tuple[Any, int]:
@@ -135,18 +135,24 @@ class Client:
             pause_s *= 2
         raise AssertionError("it counts without an end")
 
-    def ask_json(self, method: str, path: str, *names: str, **content: Any) -> dict[str, Any]:
-        """The JSON object of an answer, which holds these names. Raises ServiceError as `ask`, and where it is none."""
+    def ask_json(
+        self, method: str, path: str, *names: str, reads: Callable[[dict[str, Any]], Any] = dict, **content: Any
+    ) -> Any:
+        """The JSON object of an answer, which holds these names, or what `reads` makes of it.
+
+        Raises:
+            ServiceError: as `ask`; and where there is no such object, or `reads` fails.
+        """
         answer = self.ask(method, path, **content)
         try:
             found = answer.json()
-        except ValueError as fault:
-            raise self.stranger(answer.status_code) from fault
-        if not isinstance(found, dict) or not found.keys() >= set(names):
-            raise self.stranger(answer.status_code)
-        return found
+            if not isinstance(found, dict) or not found.keys() >= set(names):
+                raise ValueError(f"no object of {', '.join(names)}")
+            return reads(found)
+        except (ValueError, TypeError, OverflowError) as fault:
+            raise self._stranger(answer.status_code) from fault
 
-    def stranger(self, status: object) -> ServiceError:
+    def _stranger(self, status: int) -> ServiceError:
         """The error of who answers otherwise than the service would; `status`: of the answer."""
         problem = f"{self._http.base_url}: no clearway service answers there"
         return ServiceError(f"status {status}", f"{problem}. Check the address")
@@ -195,15 +201,8 @@ class ClientSession:
     def act(self, picture: object) -> Decision:
         """What to do, seeing a picture; kinds and errors as in `set_target`."""
         with self._counted("step") as number:
-            content = _body(picture)
-            answer = self._client.ask_json("POST", f"{self._path}/steps", *ANSWER, params=number, **content)
-            index, told, value, arrived = (answer[name] for name in ANSWER)
-            try:
-                probabilities = None if told is None else np.array(told, np.float32)
-                decision = Decision(Action(index), probabilities, None if value is None else float(value))
-            except (ValueError, TypeError, OverflowError) as fault:
-                raise self._client.stranger("200") from fault
-        self.arrived = arrived
+            path, content = f"{self._path}/steps", _body(picture)
+            decision, self.arrived = self._client.ask_json("POST", path, *ANSWER, reads=_step, params=number, **content)
         return decision
 
     @contextmanager
@@ -237,6 +236,17 @@ class ClientSession:
         except ServiceError:
             if fault is None:
                 raise
+
+
+def _step(answer: dict[str, Any]) -> tuple[Decision, bool | None]:
+    """A step's decision, and whether the agent has arrived. Raises ValueError, TypeError, OverflowError."""
+    index, told, value, arrived = (answer[name] for name in ANSWER)
+    probabilities = None if told is None else np.array(told, np.float32)
+    if probabilities is not None and probabilities.shape != (ACTION_COUNT,):
+        raise ValueError(f"probabilities of {probabilities.shape} actions")
+    if arrived is not None and not isinstance(arrived, bool):
+        raise ValueError(f"arrived={arrived!r:.40}")
+    return Decision(Action(index), probabilities, None if value is None else float(value)), arrived
 
 
 def _is_proxy_s(answer: Any) -> bool:

@@ -163,7 +163,7 @@ class Views:
         found = []
         for room, shard in enumerate(self.shards):
             count = len(shard) // self.takes
-            firsts = range(0, count - together + 1, poses)  # a rest of fewer than `together` goes with the last block
+            firsts = range(0, max(1, count - together + 1), poses)  # a rest below `together` goes with the last block
             ends = [*firsts[1:], count]
             found += [_Block(room, first, end - first) for first, end in zip(firsts, ends, strict=True)]
         return found
