@@ -201,13 +201,15 @@ def test_fewer_contacts_of_five_seeds_are_told(setting: Setting) -> None:
         return {"contacts": (1 if aware else 3) + 0.1 * seed, "close_s": (2 if aware else 1) + 0.1 * seed}
 
     claims = walked(setting, kept)
-    assert len(claims) == 12
+    assert len(claims) == 15
     assert claims["paper, touching: collision-aware, fewer contacts than shortest"].verdict == "holds"
     assert claims["paper, touching: collision-aware, fewer contacts than bump"].verdict == "holds"
     assert claims["paper, touching: clearance, fewer contacts than shortest"].verdict == "undecided"
     near = claims["paper, staying near: collision-aware, less time within 10 cm than shortest"]
     assert near.verdict == "does not hold"
     assert near.numbers["first"].value == pytest.approx(2.2 / 20)
+    beside = claims["paper, staying near, bump: collision-aware, less time within 10 cm than bump"]
+    assert beside.verdict == "does not hold" and "for 3 claims" in beside.evidence and "for 6 claims" in near.evidence
 
 
 def test_who_arrives_less_often_is_not_told_better(setting: Setting) -> None:

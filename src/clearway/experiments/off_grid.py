@@ -18,7 +18,7 @@ from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import further, judged_less, judged_more, with_failures
 from clearway.live.conditions import Condition, sweep_settings
-from clearway.reward import CLEARANCE, COLLISION_AWARE, SHORTEST
+from clearway.reward import BUMP, CLEARANCE, COLLISION_AWARE, SHORTEST
 
 NAME = "off-grid"
 EPISODES_PER_TARGET, STEP_LIMIT = 4, 40
@@ -33,7 +33,8 @@ LOST = 0.05
 """Share of episodes by which one kind may arrive less often and still be told better; few are walked."""
 TOUCHING = ("contacts", "least clearance")
 STAYING_NEAR = ("within 10 cm", "within 30 cm", "in the collision zone")
-"""Of both kinds of figures six claims are made: five seeds of an agent decide no more after Holm's correction."""
+"""Of both kinds of figures six claims are made: five seeds of an agent decide no more after Holm's correction. Three
+more, of staying near, are of a family of their own."""
 
 
 Row = tuple[str, str]
@@ -125,7 +126,7 @@ def _table(setting: Setting, found: Mapping[Row, np.ndarray]) -> ReportTable:
 
 
 def _claims(setting: Setting, found: Mapping[Row, np.ndarray]) -> Iterator[Claim]:
-    """Two families for each learner: what agents touch or come near to, and how long they stay near."""
+    """Three families for each learner: what agents touch or come near to; how long they stay near; also than `bump`."""
     for learner in setting.learners:
         own = {agent: scores.mean(1) for (name, agent), scores in found.items() if name == learner}
         for figure in TOUCHING:
@@ -134,6 +135,8 @@ def _claims(setting: Setting, found: Mapping[Row, np.ndarray]) -> Iterator[Claim
         for figure in STAYING_NEAR:
             for first in (COLLISION_AWARE, CLEARANCE):
                 yield _claim(setting, f"{learner}, staying near", figure, first.name, SHORTEST.name, own)
+        for figure in STAYING_NEAR:
+            yield _claim(setting, f"{learner}, staying near, bump", figure, COLLISION_AWARE.name, BUMP.name, own)
 
 
 def _claim(setting: Setting, family: str, figure: str, first: str, second: str, own: Mapping[str, np.ndarray]) -> Claim:
