@@ -155,7 +155,10 @@ def test_more_frames_come_to_what_the_record_holds(tmp_path: Path) -> None:
             after = "1.5 M" if content["about"]["halfway"] else "3 M frames"
             agents.setdefault((run["reward"]["name"], after), {})[run["seed"]] = {
                 "lost": int((reached == 0).sum()),
-                "figures": (steps[of_it].mean(), steps[~of_it].mean(), collisions[~of_it].mean()),
+                "figures": (
+                    *(steps.mean(), collisions.mean()),
+                    *(steps[of_it].mean(), steps[~of_it].mean(), collisions[~of_it].mean()),
+                ),
             }
     assert len(runs) == 6 and all(set(own) == {5, 6, 7} for own in agents.values())
     ends = [(folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()[-1] for folder in runs]
@@ -170,6 +173,10 @@ def test_more_frames_come_to_what_the_record_holds(tmp_path: Path) -> None:
             cells = [one.replace(",", "") for one in cell.split(", ")]
             for one, agent in zip(cells, own, strict=True):
                 assert_written(one, float(agent["figures"][number]), f"{arm}, {cell}")
+    finals = {reward: [agents[reward, "3 M frames"][seed]["figures"] for seed in (5, 6, 7)] for reward in REWARDS}
+    more = [own[1] / other[1] for own, other in zip(finals["collision-aware"], finals["shortest"], strict=True)]
+    assert more[0] < 1 and all(200 < times < 250 for times in more[1:]) and "some 200 times `shortest`'s" in page
+    assert all(own[4] < other[4] for own in finals["collision-aware"] for other in finals["shortest"])
     losing = {reward: sum(agents[reward, "3 M frames"][seed]["lost"] > 0 for seed in (5, 6, 7)) for reward in REWARDS}
     assert losing == {"shortest": 0, "collision-aware": 2}  # neither none in all, nor one in each: question 63
     lost_at = [

@@ -216,7 +216,7 @@ def test_the_default_of_seeds_5_to_9_is_as_good_as_its_record_says() -> None:
     _, record = json.loads((DOCS / "figures" / "history.json").read_text(encoding="utf-8"))
     runs = record["seeds"]
     assert [run["seed"] for run in runs] == [5, 6, 7, 8, 9] and record["learner"]["history_length"] == 4
-    ((_, *cells, seconds),) = [row for row in rows_of(RESULTS) if row[0] == "four rooms, seeds 5 to 9"]
+    ((_, *cells),) = [row for row in rows_of(RESULTS) if row[0] == "four rooms, seeds 5 to 9"]
     for cell, name in zip(cells, ("path_ratio", "worst_path_ratio", "collisions"), strict=True):
         for end, value in zip(numbers(cell), (f(run[name] for run in runs) for f in (min, max)), strict=True):
             assert_written(end, value, name)
@@ -224,9 +224,9 @@ def test_the_default_of_seeds_5_to_9_is_as_good_as_its_record_says() -> None:
         sorted(run["first_met"][name]["seconds"] for run in runs if run["first_met"][name])
         for name in ("solved_targets", "all")
     )
-    assert seconds == (f"criteria (four of five) after {met[0]:.0f} to {met[-1]:.0f}")
     assert len(met) == 4 and sum(second <= 300 for second in met) == 3
-    assert "Of [seeds 5 to 9](evidence.md#what-single-parts-bring) three do, a fourth late:" in RESULTS
+    told = f"Of [seeds 5 to 9](evidence.md#what-single-parts-bring) four do, three in time (after {met[0]:.0f} to"
+    assert f"{told} {met[-1]:.0f} s):" in RESULTS
     performance = (DOCS / "performance.md").read_text(encoding="utf-8")
     assert f"| {solved[0]:.0f} to {solved[-1]:.0f} s, five seeds |" in performance
 

@@ -16,7 +16,7 @@ from clearway.experiments.groups import Scores
 from clearway.experiments.in_short import in_short
 from clearway.experiments.job import episodes_of
 from clearway.experiments.reproduce import planned
-from clearway.experiments.section import Claim
+from clearway.experiments.section import Claim, ReportTable
 from clearway.experiments.setting import Setting
 from helpers.report_tables import by_heading
 from helpers.small_setting import FRAMES, do_here, small_setting
@@ -45,6 +45,12 @@ def test_every_room_has_agents_of_its_own(setting: Setting) -> None:
         assert row["steps"] == pytest.approx(np.mean([table.steps.mean() for table in tables if table is not None]))
         assert row["frames until settled"] == FRAMES and row["settled"] == 0
     assert rows[0]["random walk's steps"] == rows[1]["random walk's steps"] > rows[0]["shortest path"] > 1
+    beside = by_heading(section.tables[1])
+    assert [(row["room"], row["agent"]) for row in beside] == [
+        (room, agent) for agent in ("planner on a learnt map", "nearest picture") for room in ("bathroom", "kitchen")
+    ]
+    assert all(row["steps"] >= row["shortest path"] > 1 for row in beside)
+    assert [row["shortest path"] for row in beside[:2]] == [rows[0]["shortest path"], rows[2]["shortest path"]]
     (figure,) = section.figures
     assert figure.series[0].y == (1, 1) and len(set(figure.series[0].x)) == 2
     assert {claim.verdict for claim in section.claims} == {"undecided"}
@@ -85,6 +91,7 @@ def judged(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> Callable[[Rooms
         several = replace(setting, **{name: getattr(setting, name)[:1] * len(rooms) for name in ("files", "scenes")})
         several = replace(several, targets=setting.targets[:1] * len(rooms))
         monkeypatch.setattr(across_rooms, "_in_room", lambda room: {"paper": next(left)})
+        monkeypatch.setattr(across_rooms, "_who_learn_nothing", lambda setting: ReportTable("beside", "", (), ()))
         return list(corrected(across_rooms.section(several)).claims)
 
     return claims

@@ -16,6 +16,7 @@ from clearway.evaluation.across_rooms import ratio_estimate, sign_flip_p
 from clearway.evaluation.across_seeds import Estimate, mean_estimate
 from clearway.experiments.convergence import ARRIVING, DETOUR, ONE_TARGET, frames_until_settled, mark_steps
 from clearway.experiments.groups import PAIR, Scores, all_jobs, compared, random_walk
+from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
@@ -89,6 +90,7 @@ def section(setting: Setting) -> Section:
         ),
         tables=(
             ReportTable(NAME, "Room by room", (*headings, *FIGURES.values(), "failed targets"), tuple(rows), (note,)),
+            _who_learn_nothing(setting),
         ),
         figures=tuple(_figures(walks, found)),
         claims=further(claim for learner, own in found.items() for claim in _claims(setting, learner, own)),
@@ -123,6 +125,21 @@ def _row(room: Setting, walked: Scores, learner: str, reward: str, own: InRoom) 
     if not own.is_complete:
         return (*of_room, learner, reward, len(own.scores), None, *(None for _ in FIGURES), None)
     return (*of_room, learner, reward, len(own.scores), own.settled, *own.figures.values(), own.scores.failed())
+
+
+def _who_learn_nothing(setting: Setting) -> ReportTable:
+    """Agents on one map of all rooms, by room."""
+    scene_of = setting.world().target_scene.numpy()
+    rows: list[tuple[Value, ...]] = []
+    for mapped in on_maps(setting, setting.trial()):
+        for number, scene in enumerate(setting.scenes):
+            own = Scores(mapped.scores.seeds, mapped.scores.values[:, scene_of == number])
+            steps, shortest, bumps = (
+                float(own.of(name).mean()) for name in ("steps", "shortest_path_steps", "collisions")
+            )
+            rows.append((scene.name, *mapped.called, len(own), shortest, steps, bumps, own.failed()))
+    headings = ("room", "agent", "map of", "seeds", "shortest path", "steps", "collisions", "failed targets")
+    return ReportTable(f"{NAME}-beside", "Beside them, who learn nothing", headings, tuple(rows), (ABOUT_MAPS,))
 
 
 def _complete(rooms: Sequence[dict[str, InRoom]]) -> list[int]:
