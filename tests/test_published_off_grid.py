@@ -18,6 +18,7 @@ from clearway.experiments.setting import Setting
 from helpers.published import (
     EVIDENCE,
     assert_written,
+    seconds_of_runs,
     section_of,
     unpack,
     words_of,
@@ -34,6 +35,32 @@ def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
     assert not section.missing
     check_off_the_grid(section, page)
     check_who_had_settled(report.setting, page)
+
+
+@pytest.mark.slow
+def test_fifteen_seeds_off_the_grid_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    unpack("off-grid-settled", tmp_path / "settled")
+    report = gather(tmp_path / "settled")
+    page = section_of(EVIDENCE, "Fifteen seeds, after 1.5 M frames")
+    (section,) = report.sections
+    assert not section.missing
+    check_off_the_grid(section, page)
+    has = settled_by_agent(report.setting)
+    assert list(has) == ["shortest", "bump", "collision-aware", "clearance"]
+    assert all(len(own) == 15 for own in has.values())
+    told = words_of(r"settled by their training: (\d+), (\d+), (\d+) and (\d+) of fifteen", page).groups()
+    assert list(map(int, told)) == [sum(own) for own in has.values()]
+    seconds = seconds_of_runs(tmp_path / "settled")
+    assert len(seconds) == 60 and f"{min(seconds):.0f} to {max(seconds):.0f} s of training a run" in page
+
+
+def settled_by_agent(setting: Setting) -> dict[str, list[bool]]:
+    """Of each trained kind of agents which runs had settled."""
+    mark = mark_steps(setting, setting.targets)
+    return {
+        agent: [settled_row(run_folder(setting.out, job.run).metrics(), mark) is not None for job in jobs]
+        for (_, agent), jobs in [*off_grid._planned(setting).items()][:4]
+    }
 
 
 def check_off_the_grid(section: Section, page: str) -> None:

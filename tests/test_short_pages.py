@@ -138,12 +138,17 @@ def test_results_have_the_bedrooms_collisions() -> None:
 
 
 def test_results_have_the_figures_off_the_grid() -> None:
-    found = EVIDENCE.partition("\n### Five seeds, published settings")[2].partition("\n### ")[0]
-    exact = {cells[0]: cells[1:3] for cells in rows_of(found)[1:7]}
-    shown = {re.sub(r"\[(.*)\]\(.*\)", r"\1", name): own for name, *own in rows_of(RESULTS.partition("## Off the")[2])}
-    assert set(exact) <= set(shown)
-    for name, cells in exact.items():
-        assert_same(" ".join(shown[name]), *cells)
+    found = EVIDENCE.partition("\n### Fifteen seeds, after 1.5 M frames")[2].partition("\n### ")[0]
+    exact = {cells[0]: [*cells[1:3], cells[4]] for cells in rows_of(found)[1:7]}
+    shown = {name: own for name, *own in rows_of(RESULTS.partition("## Off the")[2])[1:6]}
+    assert set(exact) - {"clearance"} == set(shown)
+    for name, own in shown.items():
+        assert_same(" ".join(own), *exact[name])
+    verdicts = [cells[-1] for cells in rows_of(found) if len(cells) == 5]
+    assert [verdicts.count(verdict) for verdict in ("holds", "does not hold")] == [5, 0] and len(verdicts) == 1 + 15
+    assert "five of twelve claims hold, three barely" in RESULTS
+    limit = [cells for cells in rows_of(found) if len(cells) == 5 and cells[3] == "0.05"]
+    assert len(limit) == 3 and all(cells[-1] == "holds" for cells in limit)
 
 
 def test_the_first_page_has_the_bathrooms_figures() -> None:
