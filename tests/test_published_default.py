@@ -89,7 +89,7 @@ def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: 
         f"settled after {settled[0]:.0f} to {settled[-1]:.0f} s, and\nended after {ended[0]:.0f} to {ended[-1]:.0f} s."
     )
     assert words in PAGE
-    assert f"| ended after {ended[0]:.0f} to {ended[-1]:.0f} |" in RESULTS
+    assert f"ended after {ended[0]:.0f} to {ended[-1]:.0f} s." in EVIDENCE
     performance = (DOCS / "performance.md").read_text(encoding="utf-8")
     _, others = json.loads((DOCS / "figures" / "history.json").read_text(encoding="utf-8"))
     ended += [run["seconds"] for run in others["seeds"]]

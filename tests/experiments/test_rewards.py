@@ -177,7 +177,7 @@ def test_experiments_that_were_kept_twice_are_reported_once(tmp_path: Path) -> N
     keep_request(asked(tmp_path, "table3"))
     path = tmp_path / REQUEST_FILE
     path.write_text(json.dumps(json.loads(path.read_text()) | {"names": ["table3", "fig3", "table3"]}))
-    assert read_request(tmp_path).names == ["fig3", "table3"]
+    assert read_request(tmp_path).names == ["table3", "fig3"]
 
 
 @pytest.mark.parametrize("edit", [{"new_field": 1}, {"changes": ["gone=3"]}])

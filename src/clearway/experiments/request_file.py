@@ -30,7 +30,7 @@ def read_request(out: Path) -> ReproduceRequest:
     try:
         content = read_json(path)
         dumps = [out / dump for dump in content.pop("dumps")]  # a record's lie in the folder
-        content["names"] = in_order(content["names"])  # each once, however it was kept
+        content["names"] = list(dict.fromkeys(content["names"]))  # each once, however it was kept
         if REWARDS_EXPERIMENT not in content["names"] or not content.get("rewards"):
             content["rewards"] = None  # also where it was kept as an empty list, or as the names of the default
         return ReproduceRequest(out=out, dumps=dumps, **content)
