@@ -30,7 +30,7 @@ BUILT_IN: dict[Kind, tuple[str, ...]] = {
     "algorithms": ("ppo", "a2c", "a3c", "bc", "q-learning", "recurrent", "adapt", "default", "paper", "paper-a3c"),
     "experiments": (
         *("table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "analysis", "memory", "quality"),
-        *("zones-or-step", "shuffles", "step-size", "zone-time", "zone-levels", "ablations"),
+        *("zones-or-step", "shuffles", "step-size", "clipping", "zone-time", "zone-levels", "ablations"),
         *("across-rooms", "perturbed", "off-grid", "rewards", "all"),
     ),
 }

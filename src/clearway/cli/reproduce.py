@@ -31,8 +31,8 @@ class Reproduce:
 
     names: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Some of table1, fig3, fig4, table2, table3, fig5, fig6, analysis, memory, quality, zones-or-step, shuffles,
-    step-size, zone-time, zone-levels, ablations, across-rooms, perturbed, off-grid, rewards; all: each of these; or
-    those of installed packages (clearway plugins)."""
+    step-size, clipping, zone-time, zone-levels, ablations, across-rooms, perturbed, off-grid, rewards; all: each of
+    these; or those of installed packages (clearway plugins)."""
     out: Path = Path("reproduction")
     """Folder of scenes, runs and the report."""
     budget: BudgetName = "smoke"
