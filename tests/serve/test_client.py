@@ -100,15 +100,17 @@ def test_tokens_that_cannot_be_sent(token) -> None:
     assert "secret" not in str(caught.value)
 
 
-@pytest.mark.parametrize("content", [b"<html>", b"", b"[]", b"{}", b"\xff\xfe"])
-def test_another_service_that_answers_every_request(content) -> None:
-    stranger = httpx.Client(
-        base_url="http://stranger", transport=httpx.MockTransport(lambda request: httpx.Response(200, content=content))
-    )
+@pytest.mark.parametrize("status", [200, 400])
+@pytest.mark.parametrize("content", [b"<html>", b"", b"[]", b"{}", b"\xff\xfe", b"[" * 100_000])
+def test_another_service_that_answers_every_request(content: bytes, status: int) -> None:
+    def answer(request: httpx.Request) -> httpx.Response:
+        return httpx.Response(status, content=content)
+
+    stranger = httpx.Client(base_url="http://stranger", transport=httpx.MockTransport(answer))
     client = with_service(stranger, Client("http://stranger", TOKEN))
     session = ClientSession(client, "x")
     for ask in (client.agent, client.session, lambda: session.act(plain(1))):
-        with pytest.raises(ServiceError, match="status 200: http://stranger: no clearway service answers there"):
+        with pytest.raises(ServiceError, match=f"status {status}: http://stranger: no clearway service answers there"):
             ask()
 
 

@@ -105,7 +105,7 @@ class Client:
         try:
             kept = answer.json()["error"]
             code, message = str(kept["code"]), str(kept["message"])
-        except (ValueError, KeyError, TypeError) as fault:
+        except (ValueError, KeyError, TypeError, RecursionError) as fault:
             raise self._stranger(answer.status_code) from fault
         raise ServiceError(code, message)
 
@@ -149,7 +149,7 @@ class Client:
             if not isinstance(found, dict) or not found.keys() >= set(names):
                 raise ValueError(f"no object of {', '.join(names)}")
             return reads(found)
-        except (ValueError, TypeError, OverflowError) as fault:
+        except (ValueError, TypeError, OverflowError, RecursionError) as fault:  # the last: nested too deep
             raise self._stranger(answer.status_code) from fault
 
     def _stranger(self, status: int) -> ServiceError:
