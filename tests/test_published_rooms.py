@@ -57,9 +57,11 @@ def test_twelve_rooms_are_what_their_record_comes_to(tmp_path: Path) -> None:
     assert f"({ratios[0]:.2f} to {ratios[9]:.2f} times `shortest`'s frames)" in page and ratios[9] < ratios[10] == 1
     assert f"in one (kitchen 4) after {ratios[11]:.1f} times as many" in page
     beside = by_heading(section.tables[1])
-    assert {(row["agent"], row["map of"], row["seeds"], row["failed targets"]) for row in beside} == {
-        (agent, "84,300 frames", 1, "0 of 5") for agent in ("planner on a learnt map", "nearest picture")
+    assert {(row["agent"], row["seeds"], row["failed targets"]) for row in beside} == {
+        (agent, 1, "0 of 5") for agent in ("planner on a learnt map", "nearest picture")
     }
+    maps = [int(str(row["map of"]).removesuffix(" frames").replace(",", "")) for row in beside]
+    assert f"on a map of each ({min(maps):,} to {max(maps):,} frames of random walkers, one seed a room)" in page
     assert len(beside) == 24 and all(row["steps"] == row["shortest path"] and row["collisions"] == 0 for row in beside)
 
 

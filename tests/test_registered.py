@@ -59,7 +59,7 @@ ASKED_FIRST = {
     ("without-whitening", ""): {76},
 }
 """Records of which runs tell when they were begun, how names of such runs begin, and the questions written before."""
-REWORDED = {"6e991c2"}
+REWORDED = {"6e991c2", "825fb65"}
 """Commits that put a question into clearer words while its runs were made; the page says so on top."""
 ADDED_LATER = "paper-bathroom.tar.xz"
 """Of its runs only those tell it that were added after the answer (Q-learning, cloning): nothing of 51 and 52."""

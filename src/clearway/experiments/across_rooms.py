@@ -16,7 +16,7 @@ from clearway.evaluation.across_rooms import ratio_estimate, sign_flip_p
 from clearway.evaluation.across_seeds import Estimate, mean_estimate
 from clearway.experiments.convergence import ARRIVING, DETOUR, ONE_TARGET, frames_until_settled, mark_steps
 from clearway.experiments.groups import PAIR, Scores, all_jobs, compared, random_walk
-from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
+from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps_of_room
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
@@ -90,7 +90,7 @@ def section(setting: Setting) -> Section:
         ),
         tables=(
             ReportTable(NAME, "Room by room", (*headings, *FIGURES.values(), "failed targets"), tuple(rows), (note,)),
-            _who_learn_nothing(setting),
+            _who_learn_nothing(rooms),
         ),
         figures=tuple(_figures(walks, found)),
         claims=further(claim for learner, own in found.items() for claim in _claims(setting, learner, own)),
@@ -127,15 +127,14 @@ def _row(room: Setting, walked: Scores, learner: str, reward: str, own: InRoom) 
     return (*of_room, learner, reward, len(own.scores), own.settled, *own.figures.values(), own.scores.failed())
 
 
-def _who_learn_nothing(setting: Setting) -> ReportTable:
-    """Agents on one map of all rooms, by room."""
-    scene_of = setting.world().target_scene.numpy()
+def _who_learn_nothing(rooms: Sequence[Setting]) -> ReportTable:
+    """Agents on a map of each room, which know of no other, like those that are trained there."""
     rows: list[tuple[Value, ...]] = []
-    for mapped in on_maps(setting, setting.trial()):
-        for number, scene in enumerate(setting.scenes):
-            own = Scores(mapped.scores.seeds, mapped.scores.values[:, scene_of == number])
-            steps, shortest, bumps = (
-                float(own.of(name).mean()) for name in ("steps", "shortest_path_steps", "collisions")
+    for room in rooms:
+        for mapped in on_maps_of_room(room):
+            own, (scene,) = mapped.scores, room.scenes
+            shortest, steps, bumps = (
+                float(own.of(name).mean()) for name in ("shortest_path_steps", "steps", "collisions")
             )
             rows.append((scene.name, *mapped.called, len(own), shortest, steps, bumps, own.failed()))
     headings = ("room", "agent", "map of", "seeds", "shortest path", "steps", "collisions", "failed targets")

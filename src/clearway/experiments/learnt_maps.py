@@ -80,8 +80,21 @@ def on_maps(setting: Setting, trial: Trial, frames_a_pose: Sequence[int] = FRAME
                     known |= kept(path, question, "found") or {}  # a report may be written beside a reproduction
                     keep(path, question, {"found": known})
                 found.append(known[key])
-            scores = Scores(setting.seeds, np.array([each["scores"] for each in found]))
-            yield Mapped(kind, frames, scores, tuple(each["exact"] for each in found))
+            yield _mapped(kind, frames, setting.seeds, found)
+
+
+def on_maps_of_room(room: Setting) -> Iterator[Mapped]:
+    """Both agents on a map of a setting's only scene, with as many frames a pose as `on_maps`; nothing is kept."""
+    world, trial = room.world(), room.trial()
+    frames = frames_of(world, MOST_A_POSE)
+    for kind in (PLANNER, NEAREST):
+        yield _mapped(kind, frames, room.seeds, [_tried(world, trial, kind, frames, seed) for seed in room.seeds])
+
+
+def _mapped(kind: str, frames: int, seeds: tuple[int, ...], found: Sequence[dict]) -> Mapped:
+    """Of each seed what `_tried` found."""
+    scores = Scores(seeds, np.array([each["scores"] for each in found]))
+    return Mapped(kind, frames, scores, tuple(each["exact"] for each in found))
 
 
 def _tried(world: World, trial: Trial, kind: str, frames: int, seed: int) -> dict:
