@@ -13,14 +13,17 @@ from collections.abc import Iterator
 DIGEST_LENGTH = 16
 MAIN = "__main__"
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+READING = {"copy", "count", "get", "index", "items", "keys", "values"}
+"""Methods of Python's collections that change nothing."""
 
 
 def code_of(kind: type) -> str | None:
     """Digest of the source of a class and its bases, as it stands in their files now.
 
     To it belong the parts of the same files that the class names: functions, constants, imports, and what these name,
-    with what assigns to them or calls a method of theirs. The rest of the file may change without being told of, and so
-    may what is imported, or what a function called there does to a constant.
+    with what assigns to them or calls a method of theirs, but for `READING` and what only the program that was started
+    calls. The rest of the file may change without being told of, and so may what is imported, or what a function called
+    there does to a constant.
 
     Returns:
         None for a class of clearway's or Python's, and where no source can be had.
@@ -87,24 +90,29 @@ def _bound(statement: ast.AST) -> set[str]:
     if isinstance(statement, DEFINITIONS):
         return {statement.name}
     found = set[str]()
+    loops = [node.target for node in ast.walk(statement) if isinstance(node, ast.comprehension)]
+    inside = {id(node) for target in loops for node in ast.walk(target)}  # what a comprehension alone knows
     for node in ast.walk(statement):
         if isinstance(node, DEFINITIONS):
             found.add(node.name)
         elif isinstance(node, ast.alias):
             found.add(node.asname or node.name.partition(".")[0])
-        elif isinstance(getattr(node, "ctx", None), ast.Store):
+        elif isinstance(getattr(node, "ctx", None), ast.Store) and id(node) not in inside:
             found |= _names(node)
     return found
 
 
 def _called_on(statement: ast.AST) -> set[str]:
-    """Names whose methods a statement calls, and so may change: of `TABLE.update(turn=3)` TABLE. None if it defines."""
-    if isinstance(statement, DEFINITIONS):
+    """Names whose methods a statement calls, and so may change: of `TABLE.update(turn=3)` TABLE.
+
+    None of a definition, nor of what stands below `if __name__ == "__main__":`.
+    """
+    if isinstance(statement, DEFINITIONS) or (isinstance(statement, ast.If) and "__name__" in _names(statement.test)):
         return set()
     found = set[str]()
     for node in ast.walk(statement):
         owner: ast.AST | None = node.func if isinstance(node, ast.Call) else None
-        if isinstance(owner, ast.Attribute):
+        if isinstance(owner, ast.Attribute) and owner.attr not in READING:
             while isinstance(owner, ast.Attribute | ast.Subscript | ast.Call):
                 owner = owner.func if isinstance(owner, ast.Call) else owner.value
             found |= {owner.id} if isinstance(owner, ast.Name) else set()

@@ -20,7 +20,8 @@ def test_one_environment_and_many(tmp_path) -> None:
     assert env.reset(seed=0, options={"start": 4})[1]["distance_to_go"] == 3
     assert [env.step(0)[2:4] for _ in range(3)] == [(False, False), (False, False), (True, True)]
     assert clearway.make_env(corridor_scene(), max_episode_steps=np.int64(3)).spec.max_episode_steps == 3
-    assert clearway.make_env(corridor_scene(), max_episode_steps=-1).spec.max_episode_steps is None
+    for none in (-1, np.int64(-1)):
+        assert clearway.make_env(corridor_scene(), max_episode_steps=none).spec.max_episode_steps is None
     envs = clearway.make_env(corridor_scene(), num_envs=np.int64(3), reward="shortest")
     assert isinstance(envs, ImageGoalVectorEnv)
     assert envs.reset(seed=0)[0]["observation"].shape[:2] == (3, 4)

@@ -51,6 +51,14 @@ def test_a_name_and_password_are_for_the_folder_s_own_host() -> None:
     assert list(files.found) == ["https://other/rooms/a.h5", "https://me:secret@host/rooms/b.h5"]
 
 
+def test_a_file_counts_once_however_its_server_is_spelt() -> None:
+    files = FilesOfPage("https://me:secret@host/rooms/", "https://other/rooms/")
+    for server in ("https://other", "HTTPS://Other:443", "https://u:p@other"):
+        files.feed(f'<a href="{server}/rooms/x.h5">x</a>')
+    files.feed('<a href="https://other:0/rooms/y.h5">another port</a>')
+    assert list(files.found) == ["https://other/rooms/x.h5"]
+
+
 def test_nor_are_they_lost_where_the_same_host_is_spelt_otherwise() -> None:
     files = FilesOfPage("https://me:secret@Host/rooms/", "https://host:443/rooms/")
     files.feed('<a href="a.h5"><a href="https://hOST/rooms/b.h5"><a href="https://host:8443/rooms/c.h5">')

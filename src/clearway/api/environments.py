@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +47,8 @@ def make_env(
             raise ArgumentError(f"{name}: no such option of this environment. Use one of {', '.join(known)}")
     steps, mode = options.get("max_episode_steps"), options.get("render_mode")
     if steps is not None:  # Gymnasium looks at both first, in words of its own
-        no_limit = type(steps) is int and steps == NO_LIMIT
-        options["max_episode_steps"] = steps if no_limit else as_whole("max_episode_steps", steps, 1)
+        no_limit = isinstance(steps, Integral) and steps == NO_LIMIT
+        options["max_episode_steps"] = NO_LIMIT if no_limit else as_whole("max_episode_steps", steps, 1)
     if mode is not None:
         as_word("render_mode", mode)
     options[first] = _room(scenes) if live else load_scenes(scenes)

@@ -16,7 +16,7 @@ from clearway.errors import SceneError
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 
 SAME_PLACE_M = 1e-3  # locations closer than this are one
-MOST_NEAR = 100  # locations so close to one, on average: so often one is told a little otherwise, once a heading
+MOST_NEAR = 100  # locations so close to one, itself included, on average; each heading may tell it a little otherwise
 REACH = 0.1  # a move ends at a location no farther from where it should end than this share of a step
 HEADING_TOLERANCE_DEG = 1.0
 STEP = "Give the distance of neighbouring locations as the step, and headings along which they lie"

@@ -66,7 +66,7 @@ class FilesOfPage(HTMLParser):
     def __init__(self, folder: str, page: str) -> None:
         super().__init__()
         self._page, self._places = page, {_place(folder), _place(page)}
-        self._asked = urlsplit(folder)
+        self._servers = {_server(own): own.netloc for own in map(urlsplit, (page, folder))}
         self._seen: set[str] = set()
         self.found: dict[str, None] = {}
 
@@ -91,9 +91,9 @@ class FilesOfPage(HTMLParser):
 
     def _keep(self, parts: SplitResult) -> None:
         if parts.path.rpartition("/")[2] and _place(parts.geturl()) in self._places:
-            if _server(parts) == _server(self._asked):  # a name and password are for no other
-                parts = parts._replace(netloc=self._asked.netloc)
-            self.found[parts._replace(fragment="").geturl()] = None
+            # One spelling of each server, so that a file counts once; a name and password as asked with, or none.
+            netloc = self._servers[_server(parts)]
+            self.found[parts._replace(netloc=netloc, fragment="").geturl()] = None
 
 
 def _place(address: str) -> tuple[object, ...]:
@@ -104,4 +104,4 @@ def _place(address: str) -> tuple[object, ...]:
 
 def _server(parts: SplitResult) -> tuple[str, str | None, int | None]:
     """Scheme, host and port, however they are spelt. Raises ValueError."""
-    return parts.scheme, parts.hostname, parts.port or PORTS.get(parts.scheme)
+    return parts.scheme, parts.hostname, PORTS.get(parts.scheme) if parts.port is None else parts.port
