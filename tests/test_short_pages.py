@@ -212,3 +212,20 @@ def test_the_first_page_has_the_generalists_figures(pattern: str, named: tuple[s
 def test_the_first_page_has_what_was_registered_of_flats() -> None:
     (told,) = sentence(r"in flats \d+ \(registered: (\d+)\)", README)
     assert row(rows_of(SEEING), "flats, no tour: success, SPL")[0].endswith(f", {told} %")
+
+
+def test_off_the_grid_the_first_page_says_what_is_decided() -> None:
+    (told,) = sentence(r"\[Off the grid\]\([^)]*\) (collision-aware agents .*? \(published settings\))\.", README)
+    assert " ".join(told.split()) == (
+        "collision-aware agents stay less near obstacles than shortest-path ones; beside bumps alone, and contacts: "
+        "undecided (published settings)"
+    )
+    verdicts = {
+        claim: verdict
+        for claim, *_, verdict in rows_of(section_of(EVIDENCE, "Fifteen seeds, after 1.5 M frames"))
+        if claim.startswith("collision-aware, ")
+    }
+    near = [f"collision-aware, less time within {far} cm than" for far in (10, 30)]
+    assert {verdicts[f"{claim} shortest"] for claim in near} == {"holds"}
+    beside = {verdict for claim, verdict in verdicts.items() if claim.endswith(" bump") or "contacts" in claim}
+    assert beside == {"undecided"} and len(verdicts) == 10
