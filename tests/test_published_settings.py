@@ -87,15 +87,18 @@ def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Pa
                 assert lost == found["failed targets"]
         solved = {row[1] for row in table.rows if row[0] == "steps" and row[3] == 5 and f"{row[7]:.2f}" == "10.88"}
         assert solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
-    shown = rows_of(section_of(RESULTS, "Hard targets"))
-    for agent in ("shortest", "bump", "collision-aware"):
-        ((_, *pairs),) = [line for line in shown if line[0] == agent]
-        for pair, section in zip(pairs, sections[1:], strict=True):
-            figures, lost = pair.split("; ")
-            for figure, written in zip(("steps", "collisions"), figures.split(", "), strict=True):
-                (own,) = [r for r in section.tables[0].rows if r[0] == figure and r[1:3] == ("paper", agent)]
-                assert_written(written.replace(",", ""), own[7], agent)
-                assert f"{lost} of 25" == own[4]
+    told = words_of(
+        r"1 M `shortest` fails (\d) of 25 targets, `bump` (\d), `collision-aware` (\d); after 2 M each (\d), with "
+        r"(\S+), (\S+) and (\S+) collisions",
+        section_of(RESULTS, "Hard targets"),
+    ).groups()
+    for place, agent in enumerate(("shortest", "bump", "collision-aware")):
+        once, twice = (
+            next(r for r in section.tables[0].rows if r[:3] == ("collisions", "paper", agent))
+            for section in sections[1:]
+        )
+        assert (once[4], twice[4]) == (f"{told[place]} of 25", f"{told[3]} of 25")
+        assert_written(told[4 + place], twice[7], agent)
     fixed = {f"soft fixed point ({name})" for name in ("shortest", "bump", "collision-aware")}
     assert check_beside(lines, sections[1].tables[0].rows, 3, 4) == BESIDE | LEARNERS | fixed
     hard = gather(tmp_path / "hard").setting.out / "hard_targets.json"
@@ -124,14 +127,17 @@ def test_figure_6_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) -> 
     for claim, (text, verdict, own, other, apart, p, corrected) in zip(section.claims, judged, strict=True):
         assert text == claim.text.removeprefix("paper: ")
         assert_judged(claim, verdict, p, corrected, own, other, apart)
-    lines = rows_of(section_of(RESULTS, "Unseen targets"))
-    for begin, name in (("5 trained targets", "5"), ("45", "45"), ("random walk", "random walk")):
-        ((_, success, spl),) = [line for line in lines if line[0] == begin]
-        *trained, held_out = success.removesuffix(" held-out").split(", ")
-        assert_shown(held_out, found[name]["sc"], found[name]["95 % of sc"] or "", scale=100)
-        assert_shown(spl, found[name]["SPL"], found[name]["95 % of SPL"] or "", scale=100)
-        for one in trained:
-            assert_written(one.rstrip(" %"), 100 * found[name]["sc on trained targets"], name)
+    told = words_of(
+        r"success (\S+ % \S+), not (\S+ % \S+) .* SPL (\S+ % \S+), not (\S+ % \S+); trained ones: (\d+) %, not "
+        r"(\d+) %\. A random walk does about as well: (\S+) %, SPL (\S+) %",
+        section_of(RESULTS, "Unseen targets"),
+    ).groups()
+    cells = (("sc", "95 % of sc"), ("SPL", "95 % of SPL"), ("sc on trained targets", ""))
+    for place, (figure, interval) in enumerate(cells):
+        for name, cell in zip(("45", "5"), told[2 * place : 2 * place + 2], strict=True):
+            assert_shown(cell, found[name][figure], found[name].get(interval) or "", scale=100)
+    for cell, figure in zip(told[6:], ("sc", "SPL"), strict=True):
+        assert_shown(cell, found["random walk"][figure], "", scale=100)
     seconds = seconds_of_runs(tmp_path / "fig6")
     assert len(seconds) == 25 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in page
 

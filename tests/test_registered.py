@@ -43,6 +43,7 @@ ASKED_FIRST = {
     ("bedroom-fresh", "a2c-bump-"): {59, 62},
     ("bedroom-fresh", "bc-"): {59},
     ("bedroom-fresh", "q-learning-"): {59},
+    ("clipping-bathroom", ""): {78},
     ("fig6-bathroom", ""): {67},
     ("four-rooms-default", ""): {64, 65},
     ("four-rooms-longer", ""): {37},
