@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from clearway.experiments import clipping
 from clearway.experiments.convergence import mark_steps, settled_by_seed
+from clearway.experiments.job import run_folder
 from clearway.experiments.reproduce import gather
 from clearway.experiments.setting import Setting
 from helpers.published import (
@@ -32,6 +34,14 @@ LEARNERS[clipping.LESS_ENTROPY] = f"paper, {clipping.LESS_ENTROPY}"
 PAGE = section_of(EVIDENCE, "Clipped rewards, or the weight of entropy")
 
 
+def at_half(setting: Setting, kind: tuple[str, str]) -> list[dict[str, float]]:
+    """Of each run the last metrics of the first half in which episodes ended."""
+    (group,) = (own for own in clipping._groups(setting) if (own.learner, own.agent) == kind)
+    rows = [run_folder(setting.out, run).metrics() for run in group.runs]
+    half = setting.budget.frames / 2
+    return [[row for row in own if row["frames"] <= half and row["episodes"]][-1] for own in rows]
+
+
 def check_single_runs(setting: Setting) -> None:
     """What the page says of runs one by one."""
     world, mark = setting.world(), mark_steps(setting, setting.targets)
@@ -47,6 +57,7 @@ def check_single_runs(setting: Setting) -> None:
     aware, short = (less, "collision-aware"), (less, "shortest")
     assert [(kind, seed) for kind, own in settled.items() for seed, (_, has) in own.items() if not has] == [(aware, 8)]
     others = [value for seed, value in bumps[aware].items() if seed != 8]
+    others_of_less = others
     told = (
         f"it goes to pose 48 in {to_48[aware][8]:,.0f} steps, and has {bumps[aware][8]:.2f} collisions; the four "
         f"others have at most {max(others):.3f}, the five of `shortest` {min(bumps[short].values()):.3f} to "
@@ -55,6 +66,14 @@ def check_single_runs(setting: Setting) -> None:
     assert told in PAGE
     late = [frames for kind, own in settled.items() if kind[0] == tenth for frames, _ in own.values()]
     soon = [frames for kind, own in settled.items() if kind[0] != tenth for frames, has in own.values() if has]
+    halfway = {kind: [own["steps"] for own in at_half(setting, kind)] for kind in settled}
+    at_tenth = [steps for kind, own in halfway.items() if kind[0] == tenth for steps in own]
+    others = sorted(steps for kind, own in halfway.items() if kind[0] != tenth for steps in own)
+    told = f"Halfway they take {min(at_tenth):.0f} to {max(at_tenth):.0f} steps an episode in training, all others but "
+    assert f"{told}one at most {others[-2]:.1f};" in PAGE and others[-1] > 1_000
+    apart = [np.mean([*bumps[tenth, reward].values()]) for reward in ("shortest", "collision-aware")]
+    assert f"here {apart[0] - apart[1]:.3f}: part of it" in PAGE
+    assert f"nine runs of ten\nhave few (at most {max(*others_of_less, *bumps[short].values()):.3f})" in PAGE
     words = rf"settles after {min(late) / 1e6:.2f} M frames or later, .*\nvariants but that one after (\S+) M or sooner"
     assert words_of(words, PAGE)[1] == f"{max(soon) / 1e6:.2f}"
 
@@ -72,6 +91,8 @@ def test_clipping_and_less_entropy_are_what_their_records_come_to(tmp_path: Path
     resting = {(row["learner"], row["agent"]): row for row in by_heading(rest)}
     shown = [line for line in lines if line[0] in LEARNERS and line[1] in ("shortest", "collision-aware")]
     assert len(shown) == len(settled) == len(resting) == 8
+    tenth = [resting[LEARNERS[clipping.AT_A_TENTH], agent]["collisions"] for agent in ("shortest", "collision-aware")]
+    assert f"({tenth[0]:.3f}). There the two rewards lie {tenth[0] - tenth[1]:.3f} collisions apart" in PAGE
     for name, agent, frames, steps, bumps, lost, ends in shown:
         learner = LEARNERS[name]
         until, ran = frames.rsplit(", ", 1)
@@ -109,9 +130,8 @@ def check_results(verdicts: Mapping[str, str], own: Mapping[tuple[str, str, str]
     aware = [verdict for claim, verdict in verdicts.items() if "collision-aware has" in claim]
     assert aware == ["holds"] * 2 + ["undecided"] * 2
     words = (
-        r"`shortest` has (\S+) \((\S+)\) unclipped at a tenth, (\S+) as published, (\S+) \((\S+)\) with a tenth of the "
-        r"entropy weight\. Unclipped at a tenth `collision-aware` has fewer, (\S+) \((\S+)\), in no more steps; with "
-        "less entropy: undecided"
+        r"worth beside rewards\*\*: (\S+) \((\S+), not converged\), as published (\S+), (\S+) \((\S+)\)\. At a tenth "
+        r"`collision-aware` has fewer, (\S+) \((\S+)\), in no more steps; with less entropy: undecided"
     )
     cells = words_of(words, RESULTS).groups()
     kinds = [

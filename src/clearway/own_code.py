@@ -14,16 +14,16 @@ DIGEST_LENGTH = 16
 MAIN = "__main__"
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 READING = {"copy", "count", "get", "index", "items", "keys", "values"}
-"""Methods of Python's collections that change nothing."""
+"""Methods of Python's collections that change nothing; in a loop, what they give may be changed."""
+LOOPS = (ast.For, ast.AsyncFor, ast.While, ast.comprehension)
 
 
 def code_of(kind: type) -> str | None:
     """Digest of the source of a class and its bases, as it stands in their files now.
 
     To it belong the parts of the same files that the class names: functions, constants, imports, and what these name,
-    with what assigns to them or calls a method of theirs, but for `READING` and what only the program that was started
-    calls. The rest of the file may change without being told of, and so may what is imported, or what a function called
-    there does to a constant.
+    with what assigns to them or calls a method of theirs (`READING` ones in loops alone). The rest of the file may
+    change without being told of, and so may what is imported, or what a function called there does to a constant.
 
     Returns:
         None for a class of clearway's or Python's, and where no source can be had.
@@ -103,16 +103,14 @@ def _bound(statement: ast.AST) -> set[str]:
 
 
 def _called_on(statement: ast.AST) -> set[str]:
-    """Names whose methods a statement calls, and so may change: of `TABLE.update(turn=3)` TABLE.
-
-    None of a definition, nor of what stands below `if __name__ == "__main__":`.
-    """
-    if isinstance(statement, DEFINITIONS) or (isinstance(statement, ast.If) and "__name__" in _names(statement.test)):
+    """Names whose methods a statement calls, and so may change: of `TABLE.update(turn=3)` TABLE. None if it defines."""
+    if isinstance(statement, DEFINITIONS):
         return set()
     found = set[str]()
+    reading = set() if any(isinstance(node, LOOPS) for node in ast.walk(statement)) else READING
     for node in ast.walk(statement):
         owner: ast.AST | None = node.func if isinstance(node, ast.Call) else None
-        if isinstance(owner, ast.Attribute) and owner.attr not in READING:
+        if isinstance(owner, ast.Attribute) and owner.attr not in reading:
             while isinstance(owner, ast.Attribute | ast.Subscript | ast.Call):
                 owner = owner.func if isinstance(owner, ast.Call) else owner.value
             found |= {owner.id} if isinstance(owner, ast.Name) else set()
