@@ -44,6 +44,8 @@ ASKED_FIRST = {
     ("bedroom-fresh", "bc-"): {59},
     ("bedroom-fresh", "q-learning-"): {59},
     ("clipping-bathroom", ""): {78},
+    ("constant-rate", ""): {80},
+    ("fewer-environments", ""): {79},
     ("fig6-bathroom", ""): {67},
     ("four-rooms-default", ""): {64, 65},
     ("four-rooms-longer", ""): {37},
