@@ -531,7 +531,7 @@ def test_what_the_paper_asks_stands_apart_from_further_questions(sections: dict[
     assert "paper, unclipped: fewer collisions than with the shortest-path reward" in further
     assert "paper: fewer collisions than with the shortest-path reward" not in further
     summary = report._summary(list(judged(sections).values()))
-    assert [len(table.rows) for table in summary] == [42, 90]
+    assert [len(table.rows) for table in summary] == [42, 96]
 
 
 def test_a_report_takes_with_it_what_one_that_was_cut_off_left(
