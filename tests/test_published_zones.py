@@ -20,6 +20,7 @@ from helpers.published import (
     assert_shown,
     assert_written,
     benchmark,
+    check_arms,
     check_beside,
     ends_of,
     numbers,
@@ -176,18 +177,7 @@ def test_zones_at_several_step_sizes_are_what_their_record_comes_to(tmp_path: Pa
     table, late = section.tables[0], section.tables[-1]
     rows = by_heading(table)
     assert len(late.rows) == 2 * len(step_size.ALL)
-    for row in by_heading(late):
-        step = str(row["learner"]).removeprefix("paper, ")
-        ((frames, *cells, lost),) = [cells for size, agent, *cells in lines if (size, agent) == (step, row["agent"])]
-        frames, ran = frames.rsplit(", ", 1)
-        assert_shown(frames, row["frames"], row["95 %"])
-        assert ran == f"{row['settled']} of 5"
-        for figure, cell in zip(("steps", "collisions"), cells, strict=True):
-            (own,) = [
-                r for r in rows if (r["figure"], r["learner"], r["agent"]) == (figure, row["learner"], row["agent"])
-            ]
-            assert_shown(cell, own["average"], own["95 %"])
-            assert lost == own["failed targets"]
+    check_arms(lines, table, late, {f"paper, {step}": str(step) for step in step_size.ALL})
     assert check_beside(lines, table.rows, 3, 4) == {"planner on a learnt map", "nearest picture", "random walk"}
     told = {line[0]: line[1:] for line in lines if len(line) == 7}
     assert len(told) == 1 + len(section.claims)  # with the heading

@@ -10,10 +10,11 @@ from clearway.evaluation.episodes import episode_starts
 from clearway.evaluation.metrics import METRIC_NAMES
 from clearway.evaluation.optimum import world_yardsticks
 from clearway.experiments import clipping
-from clearway.experiments.clipping import AT_A_TENTH, LESS_ENTROPY, UNCLIPPED, variants
+from clearway.experiments.clipping import AT_A_TENTH, LESS_ENTROPY, variants
 from clearway.experiments.correction import corrected
 from clearway.experiments.groups import Group, Scores
 from clearway.experiments.reproduce import planned
+from clearway.experiments.table1 import UNCLIPPED
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from helpers.report_tables import by_heading

@@ -3,12 +3,12 @@
 import json
 import re
 import runpy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from clearway.experiments.groups import EXACT, WALKED
-from clearway.experiments.section import Claim, Section
+from clearway.experiments.section import Claim, ReportTable, Section
 from helpers.report_tables import by_heading
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -152,6 +152,28 @@ def check_beside(rows: list[list[str]], recorded: Sequence[Sequence[Any]], steps
         told |= set(names)
         assert_frames(row[0], agents)
     return told
+
+
+def check_arms(lines: list[list[str]], table: ReportTable, late: ReportTable, called: Mapping[str, str]) -> None:
+    """Rows of a page: what was changed, reward, settled after, steps, collisions, failed targets; all as recorded.
+
+    Args:
+        lines: of the page's table.
+        table: steps and collisions.
+        late: frames until training had settled, a row an arm.
+        called: what the page calls each learner.
+    """
+    own = {(row["figure"], row["learner"], row["agent"]): row for row in by_heading(table)}
+    for row in by_heading(late):
+        learner, agent = row["learner"], row["agent"]
+        ((frames, steps, bumps, lost),) = [line[2:6] for line in lines if line[:2] == [called[learner], agent]]
+        until, ran = frames.rsplit(", ", 1)
+        assert_shown(until, row["frames"], row["95 %"])
+        assert ran == f"{row['settled']} of {row['seeds']}"
+        for figure, cell in (("steps", steps), ("collisions", bumps)):
+            recorded = own[figure, learner, agent]
+            assert_shown(cell, recorded["average"], recorded["95 %"])
+            assert lost == recorded["failed targets"]
 
 
 def assert_frames(cell: str, agents: dict[str, str]) -> None:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from clearway.evaluation.episodes import episode_starts
-from clearway.evaluation.metrics import by_scene
+from clearway.evaluation.metrics import average, by_scene
 from clearway.evaluation.optimum import world_yardsticks
 from clearway.experiments.convergence import settling_table
 from clearway.experiments.groups import EXACT, PAIR, Group, all_jobs, compared
@@ -21,6 +21,7 @@ from clearway.experiments.navigation_tables import METRICS, navigation_tables
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
+from clearway.experiments.table1 import UNCLIPPED
 from clearway.experiments.verdicts import further, judged_less, judged_no_more, with_failures
 from clearway.learn.learner import Learner
 from clearway.learn.on_policy import OnPolicy
@@ -28,7 +29,7 @@ from clearway.learn.settings import with_settings
 from clearway.reward import COLLISION_AWARE, SHORTEST
 
 NAME = "clipping"
-UNCLIPPED, AT_A_TENTH, LESS_ENTROPY = "unclipped", "unclipped at a tenth", "a tenth of the entropy weight"
+AT_A_TENTH, LESS_ENTROPY = f"{UNCLIPPED} at a tenth", "a tenth of the entropy weight"
 
 
 def jobs(setting: Setting) -> list[Job]:
@@ -94,7 +95,7 @@ def _resting(setting: Setting) -> ReportTable:
             found = world_yardsticks(world, learner.paid(reward), entropy_weight=entropy, starts=starts)
             policies = [each.yardstick.soft for each in found]
             values = np.array([[getattr(policy, metric) for metric in METRICS] for policy in policies])
-            means = by_scene(values, world.target_scene.numpy()).mean(axis=0)
+            means = average(by_scene(values, world.target_scene.numpy()))
             rows.append((EXACT, name, reward.name, entropy, *means.tolist()))
     headings = ("figure", "learner", "agent", "entropy weight beside rewards unscaled", *METRICS)
     return ReportTable(f"{NAME}_rest", "Where each comes to rest, exactly", headings, tuple(rows))
