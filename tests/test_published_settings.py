@@ -88,7 +88,8 @@ def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Pa
         solved = {row[1] for row in table.rows if row[0] == "steps" and row[3] == 5 and f"{row[7]:.2f}" == "10.88"}
         assert solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
     told = words_of(
-        r"1 M `shortest` fails (\d) of 25 targets, `bump` (\d), `collision-aware` (\d); after 2 M each (\d), with "
+        r"1 M `shortest` fails (\d) of 25 targets \((\S+) collisions\), `bump` (\d) \((\S+)\), `collision-aware` (\d) "
+        r"\((\S+)\); after 2 M each (\d), with "
         r"(\S+), (\S+) and (\S+) collisions",
         section_of(RESULTS, "Hard targets"),
     ).groups()
@@ -97,8 +98,9 @@ def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Pa
             next(r for r in section.tables[0].rows if r[:3] == ("collisions", "paper", agent))
             for section in sections[1:]
         )
-        assert (once[4], twice[4]) == (f"{told[place]} of 25", f"{told[3]} of 25")
-        assert_written(told[4 + place], twice[7], agent)
+        assert (once[4], twice[4]) == (f"{told[2 * place]} of 25", f"{told[6]} of 25")
+        assert_written(told[2 * place + 1], once[7], agent)
+        assert_written(told[7 + place], twice[7], agent)
     fixed = {f"soft fixed point ({name})" for name in ("shortest", "bump", "collision-aware")}
     assert check_beside(lines, sections[1].tables[0].rows, 3, 4) == BESIDE | LEARNERS | fixed
     hard = gather(tmp_path / "hard").setting.out / "hard_targets.json"

@@ -13,17 +13,15 @@ from collections.abc import Iterator
 DIGEST_LENGTH = 16
 MAIN = "__main__"
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-READING = {"copy", "count", "get", "index", "items", "keys", "values"}
-"""Methods of Python's collections that change nothing; in a loop, what they give may be changed."""
-LOOPS = (ast.For, ast.AsyncFor, ast.While, ast.comprehension)
 
 
 def code_of(kind: type) -> str | None:
     """Digest of the source of a class and its bases, as it stands in their files now.
 
     To it belong the parts of the same files that the class names: functions, constants, imports, and what these name,
-    with what assigns to them or calls a method of theirs (`READING` ones in loops alone). The rest of the file may
-    change without being told of, and so may what is imported, or what a function called there does to a constant.
+    with what assigns to them or calls a method of theirs, also one that only reads. The rest of the file may change
+    without being told of, and so may what is imported, or what is done to a constant by a function called there or
+    under another name.
 
     Returns:
         None for a class of clearway's or Python's, and where no source can be had.
@@ -91,7 +89,7 @@ def _bound(statement: ast.AST) -> set[str]:
         return {statement.name}
     found = set[str]()
     loops = [node.target for node in ast.walk(statement) if isinstance(node, ast.comprehension)]
-    inside = {id(node) for target in loops for node in ast.walk(target)}  # what a comprehension alone knows
+    inside = {id(node) for target in loops for node in ast.walk(target) if isinstance(node, ast.Name)}  # its own names
     for node in ast.walk(statement):
         if isinstance(node, DEFINITIONS):
             found.add(node.name)
@@ -107,10 +105,9 @@ def _called_on(statement: ast.AST) -> set[str]:
     if isinstance(statement, DEFINITIONS):
         return set()
     found = set[str]()
-    reading = set() if any(isinstance(node, LOOPS) for node in ast.walk(statement)) else READING
     for node in ast.walk(statement):
         owner: ast.AST | None = node.func if isinstance(node, ast.Call) else None
-        if isinstance(owner, ast.Attribute) and owner.attr not in reading:
+        if isinstance(owner, ast.Attribute):
             while isinstance(owner, ast.Attribute | ast.Subscript | ast.Call):
                 owner = owner.func if isinstance(owner, ast.Call) else owner.value
             found |= {owner.id} if isinstance(owner, ast.Name) else set()

@@ -52,7 +52,7 @@ def test_a_name_and_password_are_for_the_folder_s_own_host() -> None:
 
 
 def test_a_file_counts_once_however_its_server_is_spelt() -> None:
-    files = FilesOfPage("https://me:secret@host/rooms/", "https://other/rooms/")
+    files = FilesOfPage("https://me:secret@host/rooms/", "https://q:r@other/rooms/")
     for server in ("https://other", "HTTPS://Other:443", "https://u:p@other"):
         files.feed(f'<a href="{server}/rooms/x.h5">x</a>')
     files.feed('<a href="https://other:0/rooms/y.h5">another port</a>')

@@ -66,7 +66,8 @@ class FilesOfPage(HTMLParser):
     def __init__(self, folder: str, page: str) -> None:
         super().__init__()
         self._page, self._places = page, {_place(folder), _place(page)}
-        self._servers = {_server(own): own.netloc for own in map(urlsplit, (page, folder))}
+        moved, asked = urlsplit(page), urlsplit(folder)
+        self._servers = {_server(moved): moved.netloc.rpartition("@")[2], _server(asked): asked.netloc}
         self._seen: set[str] = set()
         self.found: dict[str, None] = {}
 
